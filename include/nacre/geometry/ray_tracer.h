@@ -1,0 +1,61 @@
+// Rays against meshes, with Embree.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "nacre/geometry/mesh.h"
+
+namespace nacre {
+
+inline constexpr std::uint32_t kNoHit = 0xffffffffu;
+
+struct Ray {
+  Vec3 origin;
+  Vec3 direction;  // any length; distances are in multiples of it
+  float t_min = 0;
+  float t_max = std::numeric_limits<float>::infinity();
+};
+
+struct Hit {
+  float t = 0;
+  std::uint32_t mesh = kNoHit;  // index into the meshes that were given
+  std::uint32_t triangle = 0;
+  float u = 0, v = 0;  // barycentric weights of the triangle's second and third vertex
+  explicit operator bool() const { return mesh != kNoHit; }
+};
+
+/// A bounding volume hierarchy over meshes, which it refers to and which have to outlive it unchanged.
+class RayTracer {
+ public:
+  /// `masks[i]` (all ones if empty) is compared with a ray's mask: a mesh is seen if they share a bit.
+  /// Throws Error(kLimit) when Embree runs out of memory, Error(kIo) when it cannot start.
+  explicit RayTracer(std::span<const Mesh* const> meshes, std::span<const std::uint32_t> masks = {});
+  ~RayTracer();
+  RayTracer(RayTracer&&) noexcept;
+  RayTracer& operator=(RayTracer&&) noexcept;
+
+  /// Nearest hit, both sides of every triangle. Watertight (Embree's robust mode).
+  Hit intersect(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
+  /// Whether anything lies between t_min and t_max.
+  bool occluded(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
+  /// Box around everything; empty when there is nothing.
+  Box3 bounds() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The point of a hit from the triangle's own vertices: accurate to a few ulp of their coordinates, unlike origin + t * direction.
+Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
+/// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
+Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
+
+/// `position` moved off the surface along `normal` by a distance that exceeds the rounding error of positions, hits and
+/// rays at these coordinates, so that a ray from there does not meet the surface it starts on.
+Vec3 offset_from_surface(const Vec3& position, const Vec3& normal) noexcept;
+
+}  // namespace nacre

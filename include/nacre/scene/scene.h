@@ -1,0 +1,118 @@
+// A scene as plain data: shapes in world space, media, surfaces, lights, cameras, film. What a scene file means, no more.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "nacre/base/error.h"
+#include "nacre/base/math.h"
+#include "nacre/geometry/mesh.h"
+#include "nacre/optics/medium.h"
+
+namespace nacre {
+
+/// Lambertian: albedo / pi. One-sided as in Mitsuba: black from behind.
+struct DiffuseSurface {
+  Rgb reflectance{0.5f, 0.5f, 0.5f};
+};
+/// Smooth dielectric boundary: on a translucent shape the boundary of the medium, else clear glass.
+struct DielectricSurface {
+  float int_ior = 1.5046f, ext_ior = 1.000277f;
+  Rgb specular_reflectance{1, 1, 1}, specular_transmittance{1, 1, 1};
+};
+/// Smooth dielectric coat over a diffuse base.
+struct PlasticSurface {
+  float int_ior = 1.49f, ext_ior = 1.000277f;
+  Rgb diffuse_reflectance{0.5f, 0.5f, 0.5f}, specular_reflectance{1, 1, 1};
+  bool nonlinear = false;
+};
+struct Surface {
+  std::string id, place;
+  std::variant<DiffuseSurface, DielectricSurface, PlasticSurface> model;
+};
+
+/// How the samples of one subsurface element are to be made, next to its Medium.
+struct SubsurfaceSettings {
+  int irradiance_samples = 0;    // per light; 0: nacre's default
+  bool indirect = true;          // irrIndirect
+  float sample_multiplier = 1;  // times the default number of samples
+};
+
+/// Emission of light. Positions and directions in world space; spectra are scene-linear rgb.
+struct PointLight {
+  Vec3 position;
+  Rgb intensity;  // per steradian
+};
+struct DirectionalLight {
+  Vec3 direction;  // of travel, unit length
+  Rgb irradiance;  // perpendicular to it
+};
+/// Every point of a shape's front side emits.
+struct AreaLight {
+  std::uint32_t shape;  // index into Scene::shapes
+  Rgb radiance;
+};
+struct Light {
+  std::string id, place;
+  std::variant<PointLight, DirectionalLight, AreaLight> model;
+};
+
+inline constexpr int kNone = -1;
+
+struct Shape {
+  std::string id;     // from the file, else "shape 1", "shape 2", ... in order of appearance
+  std::string type;   // "obj", "sphere", ...
+  std::string place;  // "file:line"
+  Mesh mesh;          // world space
+  int surface = kNone;  // index into Scene::surfaces; kNone on a translucent shape: smooth boundary of the medium's eta
+  int medium = kNone;   // index into Scene::media
+  int light = kNone;    // index into Scene::lights (an AreaLight)
+};
+
+/// Mitsuba's camera space: looks along +z, +y up, +x to the left of the picture.
+struct Camera {
+  std::string id, place;
+  Matrix4 to_world;
+  float fov_x = 39.3077f;  // full horizontal angle of the whole picture, degrees, for the size in `Film`
+  float near_clip = 1e-2f, far_clip = 1e4f;
+};
+
+enum class FilterKind { kBox, kGaussian };
+struct Film {
+  int width = 768, height = 576;
+  FilterKind filter = FilterKind::kGaussian;
+  float filter_radius = 2;   // pixels; half-width of the box (default 0.5) or cut-off of the gaussian
+  float filter_stddev = 0.5f;
+};
+
+enum class IntegratorKind { kDirect, kPath };
+struct Integrator {
+  IntegratorKind kind = IntegratorKind::kDirect;
+  int max_depth = -1;  // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen directly, 2 direct light
+  /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) for path.
+  int bounces() const;
+};
+
+struct Scene {
+  std::string path;  // of the file it came from
+  std::vector<Shape> shapes;
+  std::vector<Medium> media;
+  std::vector<SubsurfaceSettings> subsurface;  // parallel to media
+  std::vector<Surface> surfaces;
+  std::vector<Light> lights;
+  std::vector<Camera> cameras;  // at least one; the first is the default. Film belongs to all of them
+  std::vector<Film> films;      // parallel to cameras
+  int samples_per_pixel = 16;
+  Integrator integrator;
+  Warnings warnings;
+};
+
+/// Name for messages: id or "light 2".
+std::string light_name(const Scene& scene, std::size_t light);
+std::string medium_name(const Scene& scene, std::size_t medium);
+/// Index of the camera with that id. Throws Error(kValue, place) that lists the ids there are.
+std::size_t find_camera(const Scene& scene, const std::string& id, const std::string& place);
+
+}  // namespace nacre
