@@ -57,13 +57,15 @@ std::uint64_t Rng::next_bits() noexcept {
 Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept {
   const std::uint64_t seeds = mix(scramble + 0x9e3779b97f4a7c15ull);
   // Shuffling the order as well decorrelates the sequences of neighbouring pixels and lights.
-  const std::uint32_t shuffled = owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
+  const std::uint32_t shuffled =
+      owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
   return {to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds))),
           to_unit_float(owen_scramble(sobol_second(shuffled), static_cast<std::uint32_t>(seeds >> 32)))};
 }
 
 float sobol_1d(std::uint32_t index, std::uint64_t scramble) noexcept {
-  const std::uint32_t shuffled = owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
+  const std::uint32_t shuffled =
+      owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
   return to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(mix(scramble))));
 }
 

@@ -41,12 +41,13 @@ class Error : public std::exception {
 
 /// Throws Error with a formatted reason.
 template <class... Args>
-[[noreturn]] void fail(ErrorCode code, std::string place, fmt::format_string<Args...> format, Args&&... args) {
+[[noreturn]] void fail(ErrorCode code, std::string place, fmt::format_string<Args...> format,
+                       Args&&... args) {
   throw Error(code, std::move(place), fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// Things worth saying that did not stop the work: each one line, "place: reason", without a newline. Functions
-/// append to the list they are given; only a tool prints it.
+/// Things worth saying that did not stop the work: each one line, "place: reason", without a newline.
+/// Functions append to the list they are given; only a tool prints it.
 using Warnings = std::vector<std::string>;
 
 }  // namespace nacre

@@ -30,7 +30,9 @@ inline float max_channel(const Rgb& c) { return std::max(c.x, std::max(c.y, c.z)
 inline float min_channel(const Rgb& c) { return std::min(c.x, std::min(c.y, c.z)); }
 inline float mean_channel(const Rgb& c) { return (c.x + c.y + c.z) / 3.0f; }
 inline bool is_black(const Rgb& c) { return c.x == 0 && c.y == 0 && c.z == 0; }
-inline bool is_finite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+inline bool is_finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 template <class T>
 constexpr T square(T x) {
   return x * x;

@@ -1,5 +1,5 @@
-// Counter-based random numbers: every number is a pure function of (seed, stream, index), so the order of work and
-// the number of threads change nothing. Owen-scrambled Sobol points for integrals.
+// Counter-based random numbers: every number is a pure function of (seed, stream, index), so the order of
+// work and the number of threads change nothing. Owen-scrambled Sobol points for integrals.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,18 @@
 namespace nacre {
 
 /// A well-mixed 64-bit hash of up to four words.
-std::uint64_t hash_words(std::uint64_t a, std::uint64_t b = 0, std::uint64_t c = 0, std::uint64_t d = 0) noexcept;
+std::uint64_t hash_words(std::uint64_t a, std::uint64_t b = 0, std::uint64_t c = 0,
+                         std::uint64_t d = 0) noexcept;
 
 /// Uniform in [0, 1), with 24 bits.
 inline float to_unit_float(std::uint32_t bits) noexcept { return static_cast<float>(bits >> 8) * 0x1p-24f; }
 /// Uniform in [0, 1), with 53 bits.
-inline double to_unit_double(std::uint64_t bits) noexcept { return static_cast<double>(bits >> 11) * 0x1p-53; }
+inline double to_unit_double(std::uint64_t bits) noexcept {
+  return static_cast<double>(bits >> 11) * 0x1p-53;
+}
 
-/// A short sequence of independent uniforms, keyed by what it is for. Source: Steele et al. 2014 (SplitMix64).
+/// A short sequence of independent uniforms, keyed by what it is for. Source: Steele et al. 2014
+/// (SplitMix64).
 class Rng {
  public:
   explicit Rng(std::uint64_t key) noexcept : state_(key) {}
@@ -32,8 +36,8 @@ class Rng {
   std::uint64_t state_;
 };
 
-/// Point `index` of a two-dimensional Owen-scrambled Sobol (0,2)-sequence, in [0,1)^2. Different scrambles give
-/// independent randomizations; every prefix of 2^k points is stratified in all elementary intervals.
+/// Point `index` of a two-dimensional Owen-scrambled Sobol (0,2)-sequence, in [0,1)^2. Different scrambles
+/// give independent randomizations; every prefix of 2^k points is stratified in all elementary intervals.
 /// Source: Burley 2020, "Practical hash-based Owen scrambling".
 Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept;
 /// Point `index` of the scrambled van der Corput sequence, in [0,1).

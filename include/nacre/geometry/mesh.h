@@ -1,4 +1,5 @@
-// Triangle meshes as plain data. Every shape that nacre renders, built-in ones too, is one of these in world space.
+// Triangle meshes as plain data. Every shape that nacre renders, built-in ones too, is one of these in world
+// space.
 #pragma once
 
 #include <array>
@@ -27,7 +28,9 @@ inline Vec3 area_vector(const Mesh& mesh, std::size_t triangle) {
 }
 
 /// Unit geometric normal; zero for a degenerate triangle.
-inline Vec3 face_normal(const Mesh& mesh, std::size_t triangle) { return area_vector(mesh, triangle).normalized(); }
+inline Vec3 face_normal(const Mesh& mesh, std::size_t triangle) {
+  return area_vector(mesh, triangle).normalized();
+}
 
 /// Surface area, summed in double precision, in scene units squared.
 double surface_area(const Mesh& mesh);
@@ -37,7 +40,8 @@ double signed_volume(const Mesh& mesh);
 Box3 bounds(const Mesh& mesh);
 
 /// Applies an affine transform to positions and (inverse transpose) normals. A mirroring one also turns every
-/// triangle around, so that outside stays outside. Throws Error(kValue, place) if the matrix is singular or not finite.
+/// triangle around, so that outside stays outside. Throws Error(kValue, place) if the matrix is singular or
+/// not finite.
 void transform_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& place);
 
 /// Turns every triangle and normal around.
@@ -48,8 +52,8 @@ void flip_normals(Mesh& mesh);
 std::vector<std::uint32_t> weld_map(const Mesh& mesh);
 
 /// Replaces the normals: angle-weighted averages over faces around a vertex whose normals are within
-/// `max_smooth_angle` degrees; splits vertices where they are not. 180 smooths everything. Vertices at the same
-/// position are treated as one. Source: Thuermer & Wuthrich 1998 (angle weights).
+/// `max_smooth_angle` degrees; splits vertices where they are not. 180 smooths everything. Vertices at the
+/// same position are treated as one. Source: Thuermer & Wuthrich 1998 (angle weights).
 void compute_normals(Mesh& mesh, double max_smooth_angle);
 
 }  // namespace nacre

@@ -49,13 +49,15 @@ class RayTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The point of a hit from the triangle's own vertices: accurate to a few ulp of their coordinates, unlike origin + t * direction.
+/// The point of a hit from the triangle's own vertices: accurate to a few ulp of their coordinates, unlike
+/// origin + t * direction.
 Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 
-/// `position` moved off the surface along `normal` by a distance that exceeds the rounding error of positions, hits and
-/// rays at these coordinates, so that a ray from there does not meet the surface it starts on.
+/// `position` moved off the surface along `normal` by a distance that exceeds the rounding error of
+/// positions, hits and rays at these coordinates, so that a ray from there does not meet the surface it
+/// starts on.
 Vec3 offset_from_surface(const Vec3& position, const Vec3& normal) noexcept;
 
 }  // namespace nacre

@@ -14,15 +14,15 @@ enum class Convention { kPublished, kConserving };
 
 /// A homogeneous scattering medium behind a dielectric boundary. Coefficients are in 1/mm.
 struct Medium {
-  std::string id;       // from the scene file, else ""
-  std::string place;    // "file:line" where it was defined
+  std::string id;        // from the scene file, else ""
+  std::string place;     // "file:line" where it was defined
   std::string material;  // name of the preset it comes from, or ""
   Rgb sigma_s{0, 0, 0};  // unreduced scattering coefficient
   Rgb sigma_a{0, 0, 0};
-  Rgb g{0, 0, 0};           // mean cosine of Henyey-Greenstein, in (-1, 1)
-  float int_ior = 1.3f;     // inside
+  Rgb g{0, 0, 0};             // mean cosine of Henyey-Greenstein, in (-1, 1)
+  float int_ior = 1.3f;       // inside
   float ext_ior = 1.000277f;  // outside
-  float scale = 1;          // mm per scene unit
+  float scale = 1;            // mm per scene unit
   ProfileKind profile = ProfileKind::kDipole;
   Convention convention = Convention::kPublished;
 
@@ -41,7 +41,7 @@ float smallest_mean_free_path(const Medium& medium);
 /// One row of the measured tables.
 struct Preset {
   std::string_view name;
-  std::string_view source;  // "Jensen et al. 2001" or "Narasimhan et al. 2006"
+  std::string_view source;        // "Jensen et al. 2001" or "Narasimhan et al. 2006"
   Rgb sigma_s_prime, sigma_a, g;  // 1/mm
   float eta;
   Rgb tabulated_total;  // diffuse reflectance as printed in the source; negative where none is

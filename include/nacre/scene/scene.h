@@ -1,4 +1,5 @@
-// A scene as plain data: shapes in world space, media, surfaces, lights, cameras, film. What a scene file means, no more.
+// A scene as plain data: shapes in world space, media, surfaces, lights, cameras, film. What a scene file
+// means, no more.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +36,8 @@ struct Surface {
 
 /// How the samples of one subsurface element are to be made, next to its Medium.
 struct SubsurfaceSettings {
-  int irradiance_samples = 0;    // per light; 0: nacre's default
-  bool indirect = true;          // irrIndirect
+  int irradiance_samples = 0;   // per light; 0: nacre's default
+  bool indirect = true;         // irrIndirect
   float sample_multiplier = 1;  // times the default number of samples
 };
 
@@ -66,16 +67,20 @@ struct Shape {
   std::string type;   // "obj", "sphere", ...
   std::string place;  // "file:line"
   Mesh mesh;          // world space
-  int surface = kNone;  // index into Scene::surfaces; kNone on a translucent shape: smooth boundary of the medium's eta
-  int medium = kNone;   // index into Scene::media
-  int light = kNone;    // index into Scene::lights (an AreaLight)
+  int surface =
+      kNone;  // index into Scene::surfaces; kNone on a translucent shape: smooth boundary of the medium's eta
+  int medium = kNone;  // index into Scene::media
+  int light = kNone;   // index into Scene::lights (an AreaLight)
 };
+
+enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 
 /// Mitsuba's camera space: looks along +z, +y up, +x to the left of the picture.
 struct Camera {
   std::string id, place;
   Matrix4 to_world;
-  float fov_x = 39.3077f;  // full horizontal angle of the whole picture, degrees, for the size in `Film`
+  float fov = 39.3077f;  // full angle along fov_axis, degrees
+  FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;
 };
 
@@ -83,15 +88,17 @@ enum class FilterKind { kBox, kGaussian };
 struct Film {
   int width = 768, height = 576;
   FilterKind filter = FilterKind::kGaussian;
-  float filter_radius = 2;   // pixels; half-width of the box (default 0.5) or cut-off of the gaussian
+  float filter_radius = 2;  // pixels; half-width of the box (default 0.5) or cut-off of the gaussian
   float filter_stddev = 0.5f;
 };
 
 enum class IntegratorKind { kDirect, kPath };
 struct Integrator {
   IntegratorKind kind = IntegratorKind::kDirect;
-  int max_depth = -1;  // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen directly, 2 direct light
-  /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) for path.
+  int max_depth = -1;  // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen
+                       // directly, 2 direct light
+  /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) for
+  /// path.
   int bounces() const;
 };
 
