@@ -1,0 +1,43 @@
+// Diffusion profiles: how much of the light that enters at one point leaves at another, by distance.
+#pragma once
+
+#include <array>
+
+#include "nacre/optics/medium.h"
+
+namespace nacre {
+
+/// One channel of a profile, R(r) per unit area, decreasing in r. Every profile that nacre knows is a sum of two
+/// terms exp(-sigma d) (a/d^3 + b/d^2 + c/d), d = sqrt(r^2 + z^2), so that all evaluators take any of them. Lengths are in
+/// whatever unit the coefficients were given in.
+struct Profile {
+  struct Term {
+    double z = 1, sigma = 0, a = 0, b = 0, c = 0;
+  };
+  std::array<Term, 2> terms;
+  double total = 0;  // integral of R over the plane: diffuse reflectance of a half-space
+  double width = 1;  // length over which R changes near r = 0: z_r, or l for a profile singular there
+
+  /// True if R grows like 1/r at 0: a sum over samples then has to average it over each sample's own area.
+  bool singular() const { return terms[0].z == 0; }
+};
+
+/// R, R' and R'' at distance r > 0 (r = 0 as well unless singular).
+struct ProfileValue {
+  double value, slope, curvature;
+};
+double eval_profile(const Profile& profile, double r) noexcept;
+ProfileValue eval_profile_derivatives(const Profile& profile, double r) noexcept;
+
+/// Classic dipole. Source: Jensen et al. 2001 with the corrected extrapolation (both terms dimensionally sound).
+Profile make_dipole(double sigma_s_prime, double sigma_a, double eta);
+/// Dipole of improved diffusion theory with exact Fresnel moments. Source: d'Eon 2012.
+Profile make_better_dipole(double sigma_s_prime, double sigma_a, double eta);
+/// Normalized diffusion, searchlight form, albedo = the dipole's total and l = 1/sigma_t'. It contains single
+/// scattering. Source: Christensen & Burley 2015.
+Profile make_normalized_diffusion(double sigma_s_prime, double sigma_a, double eta);
+
+/// The medium's own profile, r, g, b, in scene units (coefficients times scale).
+std::array<Profile, 3> make_profiles(const Medium& medium);
+
+}  // namespace nacre
