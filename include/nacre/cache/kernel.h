@@ -1,0 +1,69 @@
+// The three channels of a diffusion profile as a table over distance, with bounds on their slope and curvature.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include "nacre/optics/profile.h"
+
+namespace nacre {
+
+/// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells. Linear
+/// interpolation within a cell is right to 3e-6 relative while sigma_tr r < 1, and to 1e-4 of the value at sigma_tr r = 15.
+class Kernel {
+ public:
+  explicit Kernel(const std::array<Profile, 3>& profiles);
+
+  struct Triple {
+    float v[3];
+  };
+
+  /// R_d at squared distance `r2`. For a singular profile not nearer than the table's start.
+  Triple eval(float r2) const noexcept {
+    const Cell& cell = cells_[index(r2)];
+    const float t = static_cast<float>(bits(r2) & kFractionMask) * kFractionScale;
+    return {{cell.value[0] + t * cell.delta[0], cell.value[1] + t * cell.delta[1], cell.value[2] + t * cell.delta[2]}};
+  }
+  /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular profiles (R_d of the
+  /// others hardly varies over a sample's share).
+  Triple eval_disc(float r2, float area) const noexcept;
+  bool singular() const noexcept { return singular_; }
+
+  /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), and of |R'|.
+  struct Bounds {
+    float hessian[3], slope[3];
+  };
+  const Bounds& bounds(float r2) const noexcept { return bounds_[bound_index(r2)]; }
+
+ private:
+  static constexpr int kCellBits = 8;   // cells per octave of r^2: 256
+  static constexpr int kBoundBits = 4;  // bound cells per octave: 16
+  static constexpr std::uint32_t kFractionMask = (1u << (23 - kCellBits)) - 1;
+  static constexpr float kFractionScale = 1.0f / static_cast<float>(1u << (23 - kCellBits));
+
+  struct alignas(32) Cell {
+    float value[4], delta[4];
+  };
+
+  static std::uint32_t bits(float r2) noexcept { return std::bit_cast<std::uint32_t>(r2); }
+  static std::uint32_t clamp_index(std::uint32_t i, std::uint32_t first, std::size_t size) noexcept {
+    if (i < first) return 0;
+    return std::min(i - first, static_cast<std::uint32_t>(size) - 1);
+  }
+  std::uint32_t index(float r2) const noexcept {
+    return clamp_index(bits(r2) >> (23 - kCellBits), first_cell_, cells_.size());
+  }
+  std::uint32_t bound_index(float r2) const noexcept {
+    return clamp_index(bits(r2) >> (23 - kBoundBits), first_bound_, bounds_.size());
+  }
+
+  std::vector<Cell> cells_;  // first: below the table's start; last: beyond its end, zero
+  std::vector<Bounds> bounds_;
+  std::uint32_t first_cell_ = 0, first_bound_ = 0;
+  bool singular_ = false;
+  std::array<Profile, 3> profiles_;
+};
+
+}  // namespace nacre

@@ -1,0 +1,16 @@
+// Building the octree over a group's samples.
+#pragma once
+
+#include <string>
+
+#include "nacre/cache/cache.h"
+
+namespace nacre {
+
+/// Sorts samples along a Morton curve and builds the octree over them; at most kMaxLeafSamples per leaf except
+/// where that many share one cell of the finest level. The group owns its data through `storage`, which is added to.
+/// The result depends on the samples alone. Throws Error(kLimit) above kMaxSamplesPerGroup.
+CacheGroup build_group(std::string name, double surface_area, const SurfaceSamples& samples,
+                       std::vector<std::shared_ptr<const void>>& storage);
+
+}  // namespace nacre

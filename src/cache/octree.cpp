@@ -1,0 +1,173 @@
+// Morton order, breadth-first subdivision, moments.
+#include "nacre/cache/octree.h"
+
+#include <numeric>
+
+#include "nacre/base/error.h"
+#include "nacre/base/parallel.h"
+
+namespace nacre {
+namespace {
+
+// Spreads 21 bits so that two zero bits follow each.
+std::uint64_t spread_bits(std::uint64_t x) {
+  x &= 0x1fffff;
+  x = (x | x << 32) & 0x1f00000000ffffull;
+  x = (x | x << 16) & 0x1f0000ff0000ffull;
+  x = (x | x << 8) & 0x100f00f00f00f00full;
+  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+  return (x | x << 2) & 0x1249249249249249ull;
+}
+
+struct Keyed {
+  std::uint64_t code;
+  std::uint32_t index;
+};
+
+std::vector<Keyed> sort_by_morton_code(const std::vector<Vec3>& positions) {
+  Box3 box;
+  for (const Vec3& p : positions) box.extendBy(p);
+  const Vec3 size = box.size();
+  const double extent = std::max({size.x, size.y, size.z});
+  const double to_cells = extent > 0 ? 0x1p21 / extent : 0;
+  const auto quantize = [&](float value, float low) {
+    return spread_bits(static_cast<std::uint64_t>(
+        std::clamp((static_cast<double>(value) - low) * to_cells, 0.0, 0x1p21 - 1)));
+  };
+  std::vector<Keyed> keyed(positions.size());
+  parallel_for(positions.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3& p = positions[i];
+      keyed[i] = {quantize(p.x, box.min.x) | quantize(p.y, box.min.y) << 1 | quantize(p.z, box.min.z) << 2,
+                  static_cast<std::uint32_t>(i)};
+    }
+  });
+  parallel_sort(keyed.begin(), keyed.end(), [](const Keyed& a, const Keyed& b) {
+    return a.code != b.code ? a.code < b.code : a.index < b.index;
+  });
+  return keyed;
+}
+
+// The tree's shape: breadth first, so that a level's nodes follow the level before it.
+std::vector<OctreeNode> divide(const std::vector<Keyed>& keyed) {
+  std::vector<OctreeNode> nodes;
+  if (keyed.empty()) return nodes;
+  nodes.push_back({});
+  nodes[0].packed_counts = static_cast<std::uint32_t>(keyed.size());
+  std::size_t level_begin = 0;
+  for (int depth = 0; depth < kMaxOctreeDepth && level_begin < nodes.size(); ++depth) {
+    const std::size_t level_end = nodes.size();
+    const int shift = 3 * (kMaxOctreeDepth - 1 - depth);
+    for (std::size_t n = level_begin; n < level_end; ++n) {
+      const std::uint32_t first = nodes[n].first_sample;
+      const std::uint32_t last = first + nodes[n].sample_count();
+      if (last - first <= kMaxLeafSamples) continue;
+      const auto first_child = static_cast<std::uint32_t>(nodes.size());
+      for (std::uint32_t begin = first; begin < last;) {
+        const std::uint64_t octant = keyed[begin].code >> shift;
+        const auto split = std::partition_point(keyed.begin() + begin, keyed.begin() + last,
+                                                [&](const Keyed& k) { return k.code >> shift == octant; });
+        const auto end = static_cast<std::uint32_t>(split - keyed.begin());
+        OctreeNode child{};
+        child.first_sample = begin;
+        child.packed_counts = end - begin;
+        nodes.push_back(child);
+        begin = end;
+      }
+      nodes[n].first_child = first_child;
+      nodes[n].packed_counts |= (static_cast<std::uint32_t>(nodes.size()) - first_child) << 28;
+    }
+    level_begin = level_end;
+  }
+  return nodes;
+}
+
+// Sums in double precision, in sample order: the bits depend on neither threads nor the tree above.
+void compute_moments(const CacheGroup& group, OctreeNode& node) {
+  const std::size_t begin = node.first_sample, end = begin + node.sample_count();
+  double weight = 0, area = 0;
+  Vec3d weighted(0, 0, 0), plain(0, 0, 0);
+  std::array<double, 3> power{};
+  for (std::size_t i = begin; i < end; ++i) {
+    const double a = group.area(i);
+    const Rgb e = group.irradiance(i);
+    const Vec3d x(group.position(i));
+    const double w = a * (static_cast<double>(e.x) + e.y + e.z);
+    weight += w;
+    weighted += x * w;
+    area += a;
+    plain += x * a;
+    for (int k = 0; k < 3; ++k) power[static_cast<std::size_t>(k)] += a * e[k];
+  }
+  const Vec3 centre(weight > 0 ? weighted / weight : area > 0 ? plain / area : Vec3d(group.position(begin)));
+  double radius2 = 0;
+  std::array<double, 3> second{};
+  std::array<Vec3d, 3> first{Vec3d(0, 0, 0), Vec3d(0, 0, 0), Vec3d(0, 0, 0)};
+  for (std::size_t i = begin; i < end; ++i) {
+    const Vec3d offset = Vec3d(group.position(i)) - Vec3d(centre);
+    const double d2 = offset.length2();
+    const Rgb e = group.irradiance(i);
+    radius2 = std::max(radius2, d2);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double w = static_cast<double>(group.area(i)) * e[static_cast<int>(k)];
+      second[k] += w * d2;
+      first[k] += offset * w;
+    }
+  }
+  // Rounded up, so that the radius still bounds and the moments still dominate.
+  const auto round_up = [](double x) { return x > 0 ? std::nextafter(static_cast<float>(x), 3e38f) : 0.0f; };
+  node.radius = round_up(std::sqrt(radius2));
+  for (int k = 0; k < 3; ++k) {
+    const auto kk = static_cast<std::size_t>(k);
+    node.centre[k] = centre[k];
+    node.power[k] = static_cast<float>(power[kk]);
+    node.second_moment[k] = round_up(second[kk]);
+    node.first_moment[k] = round_up(first[kk].length());
+  }
+}
+
+}  // namespace
+
+double hexagonal_spacing(double area, double count) {
+  return count > 0 ? std::sqrt(2 / std::sqrt(3.0) * area / count) : 0;
+}
+
+CacheGroup build_group(std::string name, double surface_area, const SurfaceSamples& samples,
+                       std::vector<std::shared_ptr<const void>>& storage) {
+  if (samples.size() > kMaxSamplesPerGroup)
+    fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(), kMaxSamplesPerGroup);
+  const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
+
+  struct Owned {
+    std::array<std::vector<float>, kPlaneCount> planes;
+    std::vector<OctreeNode> nodes;
+  };
+  const auto owned = std::make_shared<Owned>();
+  for (auto& plane : owned->planes) plane.resize(samples.size());
+  parallel_for(samples.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t from = keyed[i].index;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<std::size_t>(axis);
+        owned->planes[a][i] = samples.positions[from][axis];
+        owned->planes[3 + a][i] = samples.normals[from][axis];
+        owned->planes[7 + a][i] = samples.irradiance[from][axis];
+      }
+      owned->planes[6][i] = samples.areas[from];
+    }
+  });
+  owned->nodes = divide(keyed);
+
+  CacheGroup group;
+  group.name = std::move(name);
+  group.surface_area = surface_area;
+  for (std::size_t k = 0; k < kPlaneCount; ++k) group.planes[k] = owned->planes[k];
+  parallel_for(owned->nodes.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) compute_moments(group, owned->nodes[n]);
+  });
+  group.nodes = owned->nodes;
+  storage.push_back(owned);
+  return group;
+}
+
+}  // namespace nacre
