@@ -35,7 +35,7 @@ float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 }  // namespace
 
-Kernel::Kernel(const std::array<Profile, 3>& profiles) : profiles_(profiles) {
+Kernel::Kernel(const std::array<Profile, 3>& profiles) {
   double narrowest = 1e30, widest = 0;
   for (const Profile& p : profiles) {
     singular_ = singular_ || p.singular();

@@ -63,7 +63,6 @@ class Kernel {
   std::vector<Bounds> bounds_;
   std::uint32_t first_cell_ = 0, first_bound_ = 0;
   bool singular_ = false;
-  std::array<Profile, 3> profiles_;
 };
 
 }  // namespace nacre

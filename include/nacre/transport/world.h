@@ -1,0 +1,35 @@
+// A scene made ready for light transport: acceleration structure, light and surface tables.
+#pragma once
+
+#include <vector>
+
+#include "nacre/base/sampling.h"
+#include "nacre/geometry/ray_tracer.h"
+#include "nacre/scene/scene.h"
+#include "nacre/transport/bsdf.h"
+
+namespace nacre {
+
+/// Everything that tracing light needs. The scene has to outlive it unchanged.
+struct World {
+  const Scene* scene;
+  RayTracer tracer;                      // mesh i is Scene::shapes[i]
+  std::vector<Bsdf> bsdfs;               // parallel to Scene::shapes
+  std::vector<Distribution> emitters;    // parallel to Scene::lights: triangles of area lights by area
+  bool shadows = true;
+
+  const Shape& shape(const Hit& hit) const { return scene->shapes[hit.mesh]; }
+};
+
+/// Throws Error(kValue) for an area light whose shape has no area; Error(kLimit) when memory runs out.
+World make_world(const Scene& scene, bool shadows);
+
+/// Where a ray met a surface.
+struct SurfacePoint {
+  Vec3 position;
+  Vec3 geometric_normal;  // unit, of the triangle's front side
+  Vec3 shading_normal;    // unit, interpolated, on the same side as geometric_normal
+};
+SurfacePoint surface_point(const World& world, const Hit& hit) noexcept;
+
+}  // namespace nacre
