@@ -23,7 +23,12 @@ namespace {
 // A convex polygon around the origin, cut by half-planes.
 class Cell {
  public:
-  explicit Cell(float half_size) : corners_{{{-half_size, -half_size}, {half_size, -half_size}, {half_size, half_size}, {-half_size, half_size}}}, count_(4) {}
+  explicit Cell(float half_size)
+      : corners_{{{-half_size, -half_size},
+                  {half_size, -half_size},
+                  {half_size, half_size},
+                  {-half_size, half_size}}},
+        count_(4) {}
 
   /// Keeps the points p with dot(p, normal) <= offset.
   void clip(const Vec2& normal, float offset) {
@@ -34,7 +39,8 @@ class Cell {
       const Vec2& b = corners_[(i + 1) % count_];
       const float da = a.dot(normal) - offset, db = b.dot(normal) - offset;
       if (da <= 0) kept[kept_count++] = a;
-      if ((da < 0) != (db < 0) && da != db && kept_count < kMaxCorners) kept[kept_count++] = a + (b - a) * (da / (da - db));
+      if ((da < 0) != (db < 0) && da != db && kept_count < kMaxCorners)
+        kept[kept_count++] = a + (b - a) * (da / (da - db));
       if (kept_count >= kMaxCorners - 1) return;  // a cell of so many sides is round enough as it is
     }
     corners_ = kept;
@@ -64,11 +70,13 @@ class ShareComputer {
   ShareComputer(const GroupSurface& surface, const std::vector<PlacedPoint>& points)
       : surface_(surface),
         points_(points),
-        spacing_(static_cast<float>(hexagonal_spacing(surface.areas.total(), static_cast<double>(points.size())))),
+        spacing_(
+            static_cast<float>(hexagonal_spacing(surface.areas.total(), static_cast<double>(points.size())))),
         coordinates_(3 * points.size()),
         edges_(surface.sheet_edges, kReach * spacing_) {
     for (std::size_t i = 0; i < points.size(); ++i)
-      for (int axis = 0; axis < 3; ++axis) coordinates_[3 * i + static_cast<std::size_t>(axis)] = points[i].position[axis];
+      for (int axis = 0; axis < 3; ++axis)
+        coordinates_[3 * i + static_cast<std::size_t>(axis)] = points[i].position[axis];
     index_ = std::make_unique<Index>(flann::Matrix<float>(coordinates_.data(), points.size(), 3),
                                      flann::KDTreeSingleIndexParams(16));
     index_->buildIndex();
@@ -98,7 +106,8 @@ class ShareComputer {
   }
 
  private:
-  // Cells end at this many spacings at the latest; between points that leave no room for another they are far smaller.
+  // Cells end at this many spacings at the latest; between points that leave no room for another they are far
+  // smaller.
   static constexpr float kReach = 2;
   static constexpr std::size_t kMostNeighbours = 1280;
 
@@ -121,8 +130,8 @@ class ShareComputer {
     if (flat_length > 0.05f * distance) cell.clip(flat / flat_length, distance / 2);
   }
 
-  // A border or a crease is a side of the cell where its nearest point to the sample is inside an edge, or is the corner of
-  // a border that bends away. Isolated short creases, which noise in a scan makes, end nothing.
+  // A border or a crease is a side of the cell where its nearest point to the sample is inside an edge, or is
+  // the corner of a border that bends away. Isolated short creases, which noise in a scan makes, end nothing.
   void clip_at_edges(const PlacedPoint& point, const Frame& frame, Cell& cell) const {
     struct Side {
       Vec3 offset;
@@ -161,7 +170,8 @@ class ShareComputer {
 };
 
 // Scales each piece's shares to its area; pieces too small to hold a point leave theirs to all the others.
-void scale_shares(const GroupSurface& surface, const std::vector<PlacedPoint>& points, std::vector<float>& shares) {
+void scale_shares(const GroupSurface& surface, const std::vector<PlacedPoint>& points,
+                  std::vector<float>& shares) {
   std::vector<double> wanted(surface.component_count, 0.0), got(surface.component_count, 0.0);
   const auto cumulative = surface.areas.cumulative();
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)

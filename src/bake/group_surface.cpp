@@ -27,7 +27,8 @@ std::vector<HalfEdge> sorted_half_edges(const GroupSurface& surface, const std::
   parallel_for(surface.triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t)
       for (std::uint32_t c = 0; c < 3; ++c) {
-        const std::uint64_t from = weld[surface.triangles[t][c]], to = weld[surface.triangles[t][(c + 1) % 3]];
+        const std::uint64_t from = weld[surface.triangles[t][c]],
+                            to = weld[surface.triangles[t][(c + 1) % 3]];
         edges[3 * t + c] = {std::min(from, to) << 32 | std::max(from, to), static_cast<std::uint32_t>(t), c};
       }
   });
@@ -50,7 +51,8 @@ GroupSurface make_group_surface(std::span<const Mesh* const> meshes) {
   for (const Mesh* mesh : meshes) {
     const auto offset = static_cast<std::uint32_t>(joined.positions.size());
     joined.positions.insert(joined.positions.end(), mesh->positions.begin(), mesh->positions.end());
-    for (const Triangle& t : mesh->triangles) surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+    for (const Triangle& t : mesh->triangles)
+      surface.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
   }
   const std::vector<std::uint32_t> weld = weld_map(joined);
   surface.positions = std::move(joined.positions);
@@ -71,7 +73,8 @@ GroupSurface make_group_surface(std::span<const Mesh* const> meshes) {
   const auto add_sheet_edge = [&](const HalfEdge& edge) {
     const Triangle& t = surface.triangles[edge.triangle];
     if (areas[edge.triangle] > 0)
-      surface.sheet_edges.push_back({surface.positions[t[edge.corner]], surface.positions[t[(edge.corner + 1) % 3]],
+      surface.sheet_edges.push_back({surface.positions[t[edge.corner]],
+                                     surface.positions[t[(edge.corner + 1) % 3]],
                                      surface.normal(edge.triangle)});
   };
   for (std::size_t begin = 0; begin < edges.size();) {
@@ -79,8 +82,9 @@ GroupSurface make_group_surface(std::span<const Mesh* const> meshes) {
     while (end < edges.size() && edges[end].key == edges[begin].key) ++end;
     for (std::size_t i = begin + 1; i < end; ++i)
       parents[find_root(parents, edges[i].triangle)] = find_root(parents, edges[begin].triangle);
-    // A face without a partner that goes on in its direction ends at this edge. Degenerate partners have no direction and do
-    // not count as an end; nor do edges where so many faces meet that they are no border of anything.
+    // A face without a partner that goes on in its direction ends at this edge. Degenerate partners have no
+    // direction and do not count as an end; nor do edges where so many faces meet that they are no border of
+    // anything.
     const auto continues = [&](std::size_t i, std::size_t j) {
       return areas[edges[j].triangle] <= 0 ||
              dot(surface.normal(edges[i].triangle), surface.normal(edges[j].triangle)) > kSameSheetCosine;

@@ -1,4 +1,5 @@
-// All triangles of one group as one surface: areas, connected pieces, and the edges at which it ends or turns sharply.
+// All triangles of one group as one surface: areas, connected pieces, and the edges at which it ends or turns
+// sharply.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,9 @@
 
 namespace nacre {
 
-/// Two points lie on the same sheet of a surface if their normals agree at least this well (cosine). Points on different sheets
-/// neither keep each other at a distance nor share area: the two sides of a thin wall, the two faces at a cube's edge.
+/// Two points lie on the same sheet of a surface if their normals agree at least this well (cosine). Points
+/// on different sheets neither keep each other at a distance nor share area: the two sides of a thin wall,
+/// the two faces at a cube's edge.
 inline constexpr float kSameSheetCosine = 0.2f;
 
 /// An edge that bounds a sheet: a border of the surface or a crease sharper than kSameSheetCosine.

@@ -2,8 +2,10 @@
 #include "bake/placement.h"
 
 #include <array>
+#include <tuple>
 #include <unordered_map>
 
+#include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "nacre/cache/cache.h"
@@ -11,12 +13,12 @@
 namespace nacre {
 namespace {
 
-// Smallest distance over hexagonal spacing. With this many candidates per point about `target` darts stick (measured); more
-// candidates would allow a larger ratio, up to 0.777 at saturation.
+// Smallest distance over hexagonal spacing. With this many candidates per point about `target` darts stick
+// (measured); more candidates would allow a larger ratio, up to 0.777 at saturation.
 constexpr double kRelativeRadius = 0.715;
 constexpr int kRounds = 14;
 
-constexpr int kBlockCells = 8;              // cells of one radius along a block's side
+constexpr int kBlockCells = 8;               // cells of one radius along a block's side
 constexpr int kGridCells = kBlockCells + 2;  // with a halo of one cell
 constexpr int kCoordinateBits = 16;
 
@@ -32,14 +34,15 @@ struct Block {
 };
 
 std::uint64_t pack(int x, int y, int z) {
-  return static_cast<std::uint64_t>(x) << (2 * kCoordinateBits) | static_cast<std::uint64_t>(y) << kCoordinateBits |
-         static_cast<std::uint64_t>(z);
+  return static_cast<std::uint64_t>(x) << (2 * kCoordinateBits) |
+         static_cast<std::uint64_t>(y) << kCoordinateBits | static_cast<std::uint64_t>(z);
 }
 
 // The points of one block and its surroundings in a dense grid of cells, for constant-time look-up.
 class LocalGrid {
  public:
-  LocalGrid(const Vec3& corner, float radius) : corner_(corner), inverse_(1 / radius), radius2_(radius * radius) {
+  LocalGrid(const Vec3& corner, float radius)
+      : corner_(corner), inverse_(1 / radius), radius2_(radius * radius) {
     heads_.fill(-1);
   }
   void add(const PlacedPoint& point) {
@@ -58,7 +61,8 @@ class LocalGrid {
         for (int x = cell[0] - 1; x <= cell[0] + 1; ++x)
           for (int i = heads_[index(x, y, z)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
             const auto& [other, other_normal] = points_[static_cast<std::size_t>(i)];
-            if ((other - position).length2() < radius2_ && dot(other_normal, normal) > kSameSheetCosine) return true;
+            if ((other - position).length2() < radius2_ && dot(other_normal, normal) > kSameSheetCosine)
+              return true;
           }
     return false;
   }
@@ -89,11 +93,12 @@ class LocalGrid {
 
 class DartThrower {
  public:
-  DartThrower(const GroupSurface& surface, double target, std::uint64_t seed) : surface_(surface), seed_(seed) {
+  DartThrower(const GroupSurface& surface, double target, std::uint64_t seed)
+      : surface_(surface), seed_(seed) {
     radius_ = static_cast<float>(kRelativeRadius * hexagonal_spacing(surface.areas.total(), target));
     for (const Vec3& p : surface.positions) box_.extendBy(p);
-    // Block coordinates have to fit their bits; where space is that large blocks hold more than a block's cells,
-    // which is then the caller's limit on the number of points.
+    // Block coordinates have to fit their bits; where space is that large blocks hold more than a block's
+    // cells, which is then the caller's limit on the number of points.
     block_size_ = radius_ * static_cast<float>(kBlockCells);
     candidates_.resize(std::max<std::size_t>(static_cast<std::size_t>(target), 256));
   }
@@ -154,7 +159,8 @@ class DartThrower {
         std::array<int, 3> c;
         for (int axis = 0; axis < 3; ++axis)
           c[static_cast<std::size_t>(axis)] = static_cast<int>((p[axis] - box_.min[axis]) / block_size_) + 1;
-        candidates_[i] = {pack(c[0], c[1], c[2]) << 16 | rng.next_bits() >> 48, p, static_cast<std::uint32_t>(triangle)};
+        candidates_[i] = {pack(c[0], c[1], c[2]) << 16 | rng.next_bits() >> 48, p,
+                          static_cast<std::uint32_t>(triangle)};
       }
     });
   }
@@ -224,10 +230,12 @@ class DartThrower {
 
 }  // namespace
 
-std::vector<PlacedPoint> place_points(const GroupSurface& surface, double target, std::uint64_t seed, Progress& progress) {
+std::vector<PlacedPoint> place_points(const GroupSurface& surface, double target, std::uint64_t seed,
+                                      Progress& progress) {
   if (!(surface.areas.total() > 0) || !(target > 0)) return {};
   if (!DartThrower::fits(surface, target))
-    fail(ErrorCode::kLimit, "", "the samples are too close together for an object of this size; check `scale` or use fewer points");
+    fail(ErrorCode::kLimit, "",
+         "the samples are too close together for an object of this size; check `scale` or use fewer points");
   DartThrower thrower(surface, target, seed);
   progress.begin("placing samples", "rounds", kRounds);
   for (int round = 0; round < kRounds; ++round) {

@@ -16,7 +16,8 @@ std::uint64_t key_of(std::int64_t x, std::int64_t y, std::int64_t z) {
 
 SheetEdgeGrid::SheetEdgeGrid(std::span<const SheetEdge> edges, float reach) : edges_(edges), reach_(reach) {
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    // Points half a cell apart along the edge; the 27 cells around each hold all that is within reach of them.
+    // Points half a cell apart along the edge; the 27 cells around each hold all that is within reach of
+    // them.
     const Vec3 along = edges[e].b - edges[e].a;
     const auto steps = static_cast<std::size_t>(std::ceil(along.length() / (0.5f * reach))) + 1;
     for (std::size_t s = 0; s <= steps; ++s) {

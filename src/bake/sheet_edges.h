@@ -15,7 +15,8 @@ class SheetEdgeGrid {
  public:
   SheetEdgeGrid(std::span<const SheetEdge> edges, float reach);
 
-  /// Calls visit(edge) for every edge within `reach` of the point, and for some farther ones, each once, in their order.
+  /// Calls visit(edge) for every edge within `reach` of the point, and for some farther ones, each once, in
+  /// their order.
   template <class Visit>
   void for_each_near(const Vec3& point, const Visit& visit) const {
     if (cells_.empty()) return;

@@ -32,7 +32,8 @@ void Progress::advance(std::uint64_t units) {
   const auto now = static_cast<std::int64_t>(watch_.seconds() * 1000);
   std::int64_t due = next_print_ms_;
   // The thread that moves the due time on is the one that prints.
-  if (now < due || !next_print_ms_.compare_exchange_strong(due, now + (style_ == ProgressStyle::kBar ? 200 : 5000)))
+  if (now < due ||
+      !next_print_ms_.compare_exchange_strong(due, now + (style_ == ProgressStyle::kBar ? 200 : 5000)))
     return;
   const std::lock_guard lock(mutex_);
   print(false);
@@ -52,7 +53,8 @@ void Progress::say(const std::string& line) {
 void Progress::print(bool final) {
   const double elapsed = watch_.seconds();
   const std::uint64_t done = done_;
-  const double fraction = total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 1.0;
+  const double fraction =
+      total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 1.0;
   const char* start = style_ == ProgressStyle::kBar ? "\r\033[K" : "";
   if (final) {
     fmt::print(stderr, "{}{}: {} {} in {:.2f} s\n", start, stage_, total_, unit_, elapsed);
@@ -62,8 +64,8 @@ void Progress::print(bool final) {
   if (style_ == ProgressStyle::kBar) {
     constexpr int kWidth = 30;
     const int filled = static_cast<int>(fraction * kWidth);
-    fmt::print(stderr, "{}{} [{:=>{}}{:->{}}] {:3.0f} %  {} left", start, stage_, "", filled, "", kWidth - filled,
-               100 * fraction, left);
+    fmt::print(stderr, "{}{} [{:=>{}}{:->{}}] {:3.0f} %  {} left", start, stage_, "", filled, "",
+               kWidth - filled, 100 * fraction, left);
     std::fflush(stderr);
   } else {
     fmt::print(stderr, "{}: {:.0f} %, {} left\n", stage_, 100 * fraction, left);

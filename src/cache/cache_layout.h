@@ -38,14 +38,14 @@ inline constexpr std::array<char, 4> kInfo{'I', 'N', 'F', 'O'};
 inline constexpr std::array<char, 4> kGroup{'G', 'R', 'U', 'P'};
 inline constexpr std::array<char, 4> kNodes{'N', 'O', 'D', 'E'};
 inline constexpr std::array<std::array<char, 4>, kPlaneCount> kPlanes{{{'P', 'O', 'S', 'X'},
-                                                                        {'P', 'O', 'S', 'Y'},
-                                                                        {'P', 'O', 'S', 'Z'},
-                                                                        {'N', 'R', 'M', 'X'},
-                                                                        {'N', 'R', 'M', 'Y'},
-                                                                        {'N', 'R', 'M', 'Z'},
-                                                                        {'A', 'R', 'E', 'A'},
-                                                                        {'I', 'R', 'R', 'R'},
-                                                                        {'I', 'R', 'R', 'G'},
-                                                                        {'I', 'R', 'R', 'B'}}};
+                                                                       {'P', 'O', 'S', 'Y'},
+                                                                       {'P', 'O', 'S', 'Z'},
+                                                                       {'N', 'R', 'M', 'X'},
+                                                                       {'N', 'R', 'M', 'Y'},
+                                                                       {'N', 'R', 'M', 'Z'},
+                                                                       {'A', 'R', 'E', 'A'},
+                                                                       {'I', 'R', 'R', 'R'},
+                                                                       {'I', 'R', 'R', 'G'},
+                                                                       {'I', 'R', 'R', 'B'}}};
 
 }  // namespace nacre::layout

@@ -9,8 +9,9 @@ namespace {
 // Deepest stack of a depth-first descent: seven siblings wait on each level.
 constexpr int kStackSize = 7 * (kMaxOctreeDepth + 1) + 8;
 
-// The bound holds for the worst arrangement of samples inside a node and adds up errors that mostly cancel; what happens is
-// smaller by more than this factor (measured over the test scenes), which `tolerance`, a relative RMSE, makes use of.
+// The bound holds for the worst arrangement of samples inside a node and adds up errors that mostly cancel;
+// what happens is smaller by more than this factor (measured over the test scenes), which `tolerance`, a
+// relative RMSE, makes use of.
 constexpr double kCalibration = 8;
 
 struct Offset {
@@ -76,7 +77,8 @@ Rgb Exitance::eval(const Vec3& x, std::uint64_t& evaluations) const noexcept {
   if (group_.nodes.empty()) return {0, 0, 0};
   if (allowance_ <= 0) return eval_exact(x, evaluations);
   const Rgb guess = estimate(x, evaluations);
-  // A node may err by the allowance times half its own contribution and half the whole sum's share of its power.
+  // A node may err by the allowance times half its own contribution and half the whole sum's share of its
+  // power.
   const OctreeNode& root = group_.nodes[0];
   float own[3], share[3];
   for (int k = 0; k < 3; ++k) {
@@ -97,7 +99,8 @@ Rgb Exitance::eval(const Vec3& x, std::uint64_t& evaluations) const noexcept {
       const Kernel::Bounds& bounds = kernel_.bounds(offset.near2);
       bool good = true;
       for (int k = 0; k < 3; ++k) {
-        const float error = 0.5f * node.second_moment[k] * bounds.hessian[k] + node.first_moment[k] * bounds.slope[k];
+        const float error =
+            0.5f * node.second_moment[k] * bounds.hessian[k] + node.first_moment[k] * bounds.slope[k];
         good = good && error <= node.power[k] * (own[k] * r.v[k] + share[k]);
       }
       if (good) {

@@ -7,7 +7,8 @@
 namespace nacre {
 namespace {
 
-// Mean of 1/|x - y| over y in the unit disc, for |x| = t: complete elliptic integrals. Source: Lass & Blitzer 1983.
+// Mean of 1/|x - y| over y in the unit disc, for |x| = t: complete elliptic integrals. Source: Lass & Blitzer
+// 1983.
 double mean_inverse_distance(double t) {
   if (t <= 1) return 4 / kPiD * std::comp_ellint_2(std::min(t, 1.0));
   const double k = 1 / t;
@@ -41,8 +42,8 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
     singular_ = singular_ || p.singular();
     if (p.total <= 0) continue;
     narrowest = std::min(narrowest, p.width);
-    // Beyond 80 decay lengths exp underflows what a float can hold next to the centre's value; without absorption R falls
-    // like r^-3 and what lies beyond 1e5 widths is 1e-5 of the total.
+    // Beyond 80 decay lengths exp underflows what a float can hold next to the centre's value; without
+    // absorption R falls like r^-3 and what lies beyond 1e5 widths is 1e-5 of the total.
     for (const Profile::Term& t : p.terms)
       widest = std::max(widest, t.sigma > 0 ? std::min(80 / t.sigma, 1e6 * p.width) : 1e6 * p.width);
   }
@@ -72,8 +73,8 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
     }
   }
 
-  // Bounds per cell are taken at its near edge and made monotone from the far end; the maximum within a cell is at most a little
-  // above that at its edges, which eight points inside find, with 2 % to spare.
+  // Bounds per cell are taken at its near edge and made monotone from the far end; the maximum within a cell
+  // is at most a little above that at its edges, which eight points inside find, with 2 % to spare.
   first_bound_ = (first << kBoundBits) - 1;
   const std::size_t bound_count = (static_cast<std::size_t>(last - first) + 1) << kBoundBits;
   bounds_.resize(bound_count + 2);
@@ -82,8 +83,7 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
     for (std::size_t i = bound_count + 1; i-- > 0;) {
       const auto near_bits = static_cast<std::uint32_t>((first_bound_ + i) << (23 - kBoundBits));
       const double low = i == 0 ? 0 : std::sqrt(static_cast<double>(r2_of_bits(near_bits)));
-      const double high =
-          std::sqrt(static_cast<double>(r2_of_bits(near_bits + (1u << (23 - kBoundBits)))));
+      const double high = std::sqrt(static_cast<double>(r2_of_bits(near_bits + (1u << (23 - kBoundBits)))));
       for (int step = 0; step <= 8; ++step) {
         const double r = std::max(low + (high - low) * step / 8, 1e-3 * start);
         const ProfileValue v = eval_profile_derivatives(profiles[k], r);

@@ -1,4 +1,5 @@
-// Reading cache files: any byte may be hostile, so every count, offset, link and number is checked before use.
+// Reading cache files: any byte may be hostile, so every count, offset, link and number is checked before
+// use.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -26,8 +27,8 @@ class MappedFile {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) {
       const int error = errno;
-      fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path, "cannot read the cache: {}",
-           std::strerror(error));
+      fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path,
+           "cannot read the cache: {}", std::strerror(error));
     }
     struct stat status;
     if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
@@ -71,7 +72,8 @@ class Reader {
 
   std::span<const unsigned char> section(std::array<char, 4> kind, std::uint32_t group) const {
     if (const auto* found = find(kind, group)) return {file_->data() + found->offset, found->size};
-    fail(ErrorCode::kDamaged, path_, "section {} of group {} is missing; bake the cache again", name(kind), group);
+    fail(ErrorCode::kDamaged, path_, "section {} of group {} is missing; bake the cache again", name(kind),
+         group);
   }
 
   template <class T>
@@ -102,16 +104,20 @@ class Reader {
 
   void check_header() {
     const std::uint64_t size = file_->size();
-    if (size < layout::kMagic.size() || std::memcmp(file_->data(), layout::kMagic.data(), layout::kMagic.size()) != 0)
-      fail(ErrorCode::kNotACache, path_, "is not a nacre cache; make one with `nacre bake SCENE -o {}`", path_);
+    if (size < layout::kMagic.size() ||
+        std::memcmp(file_->data(), layout::kMagic.data(), layout::kMagic.size()) != 0)
+      fail(ErrorCode::kNotACache, path_, "is not a nacre cache; make one with `nacre bake SCENE -o {}`",
+           path_);
     if (size < sizeof(layout::Header)) truncated(sizeof(layout::Header));
     std::memcpy(&header_, file_->data(), sizeof header_);
-    // Size, checksum and version keep their places in every version, so that damage is never taken for a newer format.
+    // Size, checksum and version keep their places in every version, so that damage is never taken for a
+    // newer format.
     if (header_.header_checksum != XXH3_64bits(file_->data(), offsetof(layout::Header, header_checksum)))
       fail(ErrorCode::kDamaged, path_ + ": byte 0", "the header is damaged; bake the cache again");
     if (header_.version > kCacheVersion)
-      fail(ErrorCode::kNewerVersion, path_, "has format version {}, newer than {}, the newest this nacre reads; update nacre",
-           header_.version, kCacheVersion);
+      fail(ErrorCode::kNewerVersion, path_,
+           "has format version {}, newer than {}, the newest this nacre reads; update nacre", header_.version,
+           kCacheVersion);
     if (header_.endian_mark != layout::kEndianMark || header_.version != kCacheVersion)
       fail(ErrorCode::kDamaged, path_ + ": byte 8", "unknown version or byte order; bake the cache again");
     if (size < header_.file_size) truncated(header_.file_size);
@@ -197,19 +203,21 @@ void check_planes(const Reader& reader, const CacheGroup& group, std::uint32_t i
     if (group.planes[k].size() != group.size()) reader.damaged(kind, index, "planes differ in length");
     const bool signed_plane = k < static_cast<std::size_t>(Plane::kArea);
     if (!all(group.planes[k], [&](float v) { return std::isfinite(v) && (signed_plane || v >= 0); }))
-      reader.damaged(kind, index, signed_plane ? "a value is not finite" : "a value is negative or not finite");
+      reader.damaged(kind, index,
+                     signed_plane ? "a value is not finite" : "a value is negative or not finite");
   }
 }
 
-// The breadth-first order makes each node's place in the tree known from the nodes before it, so one pass proves that
-// the links form a tree over exactly the group's samples.
+// The breadth-first order makes each node's place in the tree known from the nodes before it, so one pass
+// proves that the links form a tree over exactly the group's samples.
 void check_nodes(const Reader& reader, const CacheGroup& group, std::uint32_t index) {
   const auto bad = [&](const char* reason) { reader.damaged(layout::kNodes, index, reason); };
   const auto nodes = group.nodes;
   if (group.size() > kMaxSamplesPerGroup) bad("too many samples");
   if (nodes.empty() != (group.size() == 0)) bad("nodes and samples do not match");
   if (nodes.empty()) return;
-  if (nodes[0].first_sample != 0 || nodes[0].sample_count() != group.size()) bad("the root does not hold every sample");
+  if (nodes[0].first_sample != 0 || nodes[0].sample_count() != group.size())
+    bad("the root does not hold every sample");
   std::uint64_t next_child = 1, level_end = 1;
   int depth = 0;
   for (std::uint64_t n = 0; n < nodes.size(); ++n) {
@@ -223,13 +231,16 @@ void check_nodes(const Reader& reader, const CacheGroup& group, std::uint32_t in
       if (node.first_child != 0) bad("a leaf has a child link");
       continue;
     }
-    if (children > 8 || node.first_child != next_child || next_child + children > nodes.size()) bad("a child link is wrong");
+    if (children > 8 || node.first_child != next_child || next_child + children > nodes.size())
+      bad("a child link is wrong");
     std::uint64_t sample = node.first_sample;
     for (std::uint64_t c = next_child; c < next_child + children; ++c) {
-      if (nodes[c].first_sample != sample || nodes[c].sample_count() == 0) bad("children do not divide their parent's samples");
+      if (nodes[c].first_sample != sample || nodes[c].sample_count() == 0)
+        bad("children do not divide their parent's samples");
       sample += nodes[c].sample_count();
     }
-    if (sample != std::uint64_t{node.first_sample} + node.sample_count()) bad("children do not divide their parent's samples");
+    if (sample != std::uint64_t{node.first_sample} + node.sample_count())
+      bad("children do not divide their parent's samples");
     next_child += children;
   }
   if (next_child != nodes.size()) bad("nodes are left over");
@@ -237,7 +248,8 @@ void check_nodes(const Reader& reader, const CacheGroup& group, std::uint32_t in
     bool good = std::isfinite(node.radius) && node.radius >= 0;
     for (int k = 0; k < 3; ++k) {
       good &= std::isfinite(node.centre[k]);
-      for (const float v : {node.power[k], node.second_moment[k], node.first_moment[k]}) good &= std::isfinite(v) && v >= 0;
+      for (const float v : {node.power[k], node.second_moment[k], node.first_moment[k]})
+        good &= std::isfinite(v) && v >= 0;
     }
     return good;
   };
@@ -249,13 +261,15 @@ CacheGroup read_group(const Reader& reader, std::uint32_t index) {
   for (const auto& [key, value] : read_key_values(reader, layout::kGroup, index)) {
     if (key == "name") group.name = value;
     if (key == "area") {
-      const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), group.surface_area);
+      const auto [end, error] =
+          std::from_chars(value.data(), value.data() + value.size(), group.surface_area);
       if (error != std::errc() || end != value.data() + value.size() || !std::isfinite(group.surface_area) ||
           group.surface_area < 0)
         reader.damaged(layout::kGroup, index, "the surface area is not a number");
     }
   }
-  for (std::size_t k = 0; k < kPlaneCount; ++k) group.planes[k] = reader.array<float>(layout::kPlanes[k], index);
+  for (std::size_t k = 0; k < kPlaneCount; ++k)
+    group.planes[k] = reader.array<float>(layout::kPlanes[k], index);
   group.nodes = reader.array<OctreeNode>(layout::kNodes, index);
   check_planes(reader, group, index);
   check_nodes(reader, group, index);

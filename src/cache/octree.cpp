@@ -135,7 +135,8 @@ double hexagonal_spacing(double area, double count) {
 CacheGroup build_group(std::string name, double surface_area, const SurfaceSamples& samples,
                        std::vector<std::shared_ptr<const void>>& storage) {
   if (samples.size() > kMaxSamplesPerGroup)
-    fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(), kMaxSamplesPerGroup);
+    fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(),
+         kMaxSamplesPerGroup);
   const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
 
   struct Owned {

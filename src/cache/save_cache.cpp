@@ -49,7 +49,8 @@ void save_cache(const Cache& cache, const std::string& path) {
   const std::string fingerprint = encode(cache.fingerprint), info = encode(cache.info);
   std::vector<std::string> group_texts;
   for (const CacheGroup& group : cache.groups)
-    group_texts.push_back(encode({{"name", group.name}, {"area", fmt::format("{:.17g}", group.surface_area)}}));
+    group_texts.push_back(
+        encode({{"name", group.name}, {"area", fmt::format("{:.17g}", group.surface_area)}}));
 
   std::vector<Section> sections{{layout::kFingerprint, 0, fingerprint.data(), fingerprint.size()},
                                 {layout::kInfo, 0, info.data(), info.size()}};
@@ -65,7 +66,8 @@ void save_cache(const Cache& cache, const std::string& path) {
   std::vector<layout::SectionEntry> table;
   std::uint64_t offset = align(sizeof(layout::Header) + sections.size() * sizeof(layout::SectionEntry));
   for (const Section& section : sections) {
-    table.push_back({section.kind, section.group, offset, section.size, XXH3_64bits(section.data, section.size)});
+    table.push_back(
+        {section.kind, section.group, offset, section.size, XXH3_64bits(section.data, section.size)});
     offset = align(offset + section.size);
   }
   layout::Header header{};

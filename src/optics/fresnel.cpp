@@ -6,8 +6,8 @@
 namespace nacre {
 namespace {
 
-// integral of f over [a, b] where f has a square-root singularity in its slope at a: mu = a + (b - a) t^2 makes it
-// smooth; then composite 5-point Gauss-Legendre.
+// integral of f over [a, b] where f has a square-root singularity in its slope at a: mu = a + (b - a) t^2
+// makes it smooth; then composite 5-point Gauss-Legendre.
 template <class F>
 double integrate_from_root(double a, double b, const F& f) {
   constexpr std::array<double, 5> kNode{0, -0.538469310105683091, 0.538469310105683091, -0.906179845938663993,
@@ -35,16 +35,18 @@ double fresnel_diffuse_reflectance(double eta) noexcept {
 double mean_transmittance(double eta) noexcept {
   // Nothing enters below the critical angle of a thinner medium.
   const double mu_critical = eta < 1 ? std::sqrt(1 - eta * eta) : 0;
-  return 2 * integrate_from_root(mu_critical, 1, [&](double mu) { return (1 - fresnel_reflectance(mu, eta)) * mu; });
+  return 2 * integrate_from_root(mu_critical, 1,
+                                 [&](double mu) { return (1 - fresnel_reflectance(mu, eta)) * mu; });
 }
 
 FresnelMoments internal_fresnel_moments(double eta) noexcept {
   const double inverse = 1 / eta;
   const double mu_critical = eta > 1 ? std::sqrt(1 - inverse * inverse) : 0;
   FresnelMoments moments{square(mu_critical) / 2, mu_critical * square(mu_critical) / 3};  // total reflection
-  moments.c1 += integrate_from_root(mu_critical, 1, [&](double mu) { return fresnel_reflectance(mu, inverse) * mu; });
-  moments.c2 +=
-      integrate_from_root(mu_critical, 1, [&](double mu) { return fresnel_reflectance(mu, inverse) * mu * mu; });
+  moments.c1 +=
+      integrate_from_root(mu_critical, 1, [&](double mu) { return fresnel_reflectance(mu, inverse) * mu; });
+  moments.c2 += integrate_from_root(mu_critical, 1,
+                                    [&](double mu) { return fresnel_reflectance(mu, inverse) * mu * mu; });
   return moments;
 }
 

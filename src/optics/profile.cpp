@@ -88,8 +88,10 @@ Profile make_better_dipole(double sigma_s_prime, double sigma_a, double eta) {
   const double z_r = 1 / c.sigma_t_prime;
   const double z_v = -z_r - 4 * big_a * big_d;
   const double weight = square(c.alpha_prime) / (4 * kPiD);
-  profile.terms[0] = {z_r, sigma_tr, weight * c_e * z_r, weight * c_e * z_r * sigma_tr, weight * c_phi / big_d};
-  profile.terms[1] = {-z_v, sigma_tr, -weight * c_e * z_v, -weight * c_e * z_v * sigma_tr, -weight * c_phi / big_d};
+  profile.terms[0] = {z_r, sigma_tr, weight * c_e * z_r, weight * c_e * z_r * sigma_tr,
+                      weight * c_phi / big_d};
+  profile.terms[1] = {-z_v, sigma_tr, -weight * c_e * z_v, -weight * c_e * z_v * sigma_tr,
+                      -weight * c_phi / big_d};
   // (1 - exp(-x)) / (D sigma_tr) with x = 4 A D sigma_tr tends to 4 A without absorption.
   const double x = 4 * big_a * big_d * sigma_tr;
   const double flux = x > 0 ? -std::expm1(-x) / (big_d * sigma_tr) : 4 * big_a;
@@ -122,9 +124,15 @@ std::array<Profile, 3> make_profiles(const Medium& medium) {
     const double eta = medium.eta();
     auto& profile = profiles[static_cast<std::size_t>(k)];
     switch (medium.profile) {
-      case ProfileKind::kDipole: profile = make_dipole(sigma_s_prime, sigma_a, eta); break;
-      case ProfileKind::kBetterDipole: profile = make_better_dipole(sigma_s_prime, sigma_a, eta); break;
-      case ProfileKind::kNormalized: profile = make_normalized_diffusion(sigma_s_prime, sigma_a, eta); break;
+      case ProfileKind::kDipole:
+        profile = make_dipole(sigma_s_prime, sigma_a, eta);
+        break;
+      case ProfileKind::kBetterDipole:
+        profile = make_better_dipole(sigma_s_prime, sigma_a, eta);
+        break;
+      case ProfileKind::kNormalized:
+        profile = make_normalized_diffusion(sigma_s_prime, sigma_a, eta);
+        break;
     }
   }
   return profiles;

@@ -40,7 +40,8 @@ Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
     return from_model(DielectricSurface{medium->int_ior, medium->ext_ior, {1, 1, 1}, {1, 1, 1}});
   }
   Bsdf bsdf = std::visit([](const auto& model) { return from_model(model); }, surface->model);
-  // What passes the boundary of a medium is the medium's to answer for; its boundary is that of the medium's eta.
+  // What passes the boundary of a medium is the medium's to answer for; its boundary is that of the medium's
+  // eta.
   if (medium && bsdf.transmits) {
     bsdf.transmits = false;
     bsdf.eta = medium->eta();
@@ -53,8 +54,8 @@ Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
 Rgb eval_diffuse(const Bsdf& bsdf, float cos_i, float cos_o) noexcept {
   if (!bsdf.coated) return bsdf.diffuse / kPi;
   // Source: the plastic model of Mitsuba 0.6; in at F_t, any number of internal reflections, out at F_t.
-  const float through = (1 - fresnel_reflectance(cos_i, bsdf.eta)) * (1 - fresnel_reflectance(cos_o, bsdf.eta)) /
-                        (bsdf.eta * bsdf.eta * kPi);
+  const float through = (1 - fresnel_reflectance(cos_i, bsdf.eta)) *
+                        (1 - fresnel_reflectance(cos_o, bsdf.eta)) / (bsdf.eta * bsdf.eta * kPi);
   Rgb value;
   for (int k = 0; k < 3; ++k) {
     const float back = bsdf.internal_reflectance * (bsdf.nonlinear ? bsdf.diffuse[k] : 1.0f);

@@ -8,7 +8,8 @@
 namespace nacre {
 namespace {
 
-LightSample sample_model(const World&, const Distribution&, const PointLight& light, const Vec3& x, const Vec2&) {
+LightSample sample_model(const World&, const Distribution&, const PointLight& light, const Vec3& x,
+                         const Vec2&) {
   const Vec3 to_light = light.position - x;
   const float distance2 = to_light.length2();
   if (!(distance2 > 0)) return {};
@@ -16,12 +17,13 @@ LightSample sample_model(const World&, const Distribution&, const PointLight& li
   return {to_light / distance, distance, light.intensity / distance2};
 }
 
-LightSample sample_model(const World&, const Distribution&, const DirectionalLight& light, const Vec3&, const Vec2&) {
+LightSample sample_model(const World&, const Distribution&, const DirectionalLight& light, const Vec3&,
+                         const Vec2&) {
   return {-light.direction, std::numeric_limits<float>::infinity(), light.irradiance};
 }
 
-LightSample sample_model(const World& world, const Distribution& triangles, const AreaLight& light, const Vec3& x,
-                         const Vec2& u) {
+LightSample sample_model(const World& world, const Distribution& triangles, const AreaLight& light,
+                         const Vec3& x, const Vec2& u) {
   const Mesh& mesh = world.scene->shapes[light.shape].mesh;
   double choice = u.x;
   const std::size_t triangle = triangles.sample(choice);
@@ -42,8 +44,9 @@ LightSample sample_model(const World& world, const Distribution& triangles, cons
 }  // namespace
 
 LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u) noexcept {
-  return std::visit([&](const auto& model) { return sample_model(world, world.emitters[light], model, x, u); },
-                    world.scene->lights[light].model);
+  return std::visit(
+      [&](const auto& model) { return sample_model(world, world.emitters[light], model, x, u); },
+      world.scene->lights[light].model);
 }
 
 bool is_visible(const World& world, const Vec3& x, const Vec3& normal, const LightSample& sample) noexcept {
@@ -54,8 +57,8 @@ bool is_visible(const World& world, const Vec3& x, const Vec3& normal, const Lig
   return !world.tracer.occluded({origin, sample.direction, 0, reach});
 }
 
-Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out, int samples,
-                         std::uint64_t key, std::uint32_t first_sample) noexcept {
+Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
+                         int samples, std::uint64_t key, std::uint32_t first_sample) noexcept {
   Rgb sum(0, 0, 0);
   const float cos_o = dot(point.shading_normal, out);
   if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) return sum;
@@ -67,7 +70,8 @@ Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoin
       const Vec2 u = sobol_2d(first_sample + static_cast<std::uint32_t>(s), hash_words(key, light));
       const LightSample sample = sample_light(world, light, point.position, u);
       const float cos_i = dot(point.shading_normal, sample.direction);
-      if (is_black(sample.irradiance) || cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0) continue;
+      if (is_black(sample.irradiance) || cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0)
+        continue;
       if (is_visible(world, point.position, point.geometric_normal, sample))
         of_light += eval_diffuse(bsdf, cos_i, cos_o) * sample.irradiance * cos_i;
     }
@@ -86,7 +90,8 @@ Rgb trace_bounced_light(const World& world, Ray ray, int bounces, std::uint64_t 
     const Bsdf& bsdf = world.bsdfs[hit.mesh];
     const float cos_o = dot(point.shading_normal, out);
     if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) break;
-    sum += throughput * reflect_direct_light(world, bsdf, point, out, 1, hash_words(key, 2 * static_cast<unsigned>(bounce)), 0);
+    sum += throughput * reflect_direct_light(world, bsdf, point, out, 1,
+                                             hash_words(key, 2 * static_cast<unsigned>(bounce)), 0);
     if (bounce == bounces) break;
 
     Rng rng(hash_words(key, 2 * static_cast<unsigned>(bounce) + 1));

@@ -16,9 +16,11 @@ World make_world(const Scene& scene, bool shadows) {
     if (const auto* area = std::get_if<AreaLight>(&light.model)) {
       const Mesh& mesh = scene.shapes[area->shape].mesh;
       std::vector<double> areas(mesh.triangles.size());
-      for (std::size_t t = 0; t < areas.size(); ++t) areas[t] = 0.5 * static_cast<double>(area_vector(mesh, t).length());
+      for (std::size_t t = 0; t < areas.size(); ++t)
+        areas[t] = 0.5 * static_cast<double>(area_vector(mesh, t).length());
       triangles = Distribution(areas);
-      if (!(triangles.total() > 0)) fail(ErrorCode::kValue, light.place, "this light's shape has no area; remove it");
+      if (!(triangles.total() > 0))
+        fail(ErrorCode::kValue, light.place, "this light's shape has no area; remove it");
     }
     world.emitters.push_back(std::move(triangles));
   }

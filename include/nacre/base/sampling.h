@@ -35,8 +35,8 @@ class Distribution {
   explicit Distribution(std::span<const double> weights);
   double total() const noexcept { return cumulative_.empty() ? 0 : cumulative_.back(); }
   std::size_t size() const noexcept { return cumulative_.size(); }
-  /// Index chosen with probability weight / total for u in [0, 1); never one of zero weight. `u` becomes the position
-  /// inside the chosen interval, uniform in [0, 1) again.
+  /// Index chosen with probability weight / total for u in [0, 1); never one of zero weight. `u` becomes the
+  /// position inside the chosen interval, uniform in [0, 1) again.
   std::size_t sample(double& u) const noexcept;
   /// Probability of an index.
   double pdf(std::size_t index) const noexcept;

@@ -14,8 +14,8 @@
 
 namespace nacre {
 
-/// Samples of one group as bake makes them. Positions and normals in scene units and world space; `areas` are shares of
-/// the surface, scene units^2; `irradiance` is the transmitted irradiance E_t.
+/// Samples of one group as bake makes them. Positions and normals in scene units and world space; `areas` are
+/// shares of the surface, scene units^2; `irradiance` is the transmitted irradiance E_t.
 struct SurfaceSamples {
   std::vector<Vec3> positions, normals;
   std::vector<float> areas;
@@ -24,18 +24,31 @@ struct SurfaceSamples {
 };
 
 /// The planes in which a cache holds its samples, in octree order.
-enum class Plane { kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kArea, kIrradianceR, kIrradianceG, kIrradianceB };
+enum class Plane {
+  kX,
+  kY,
+  kZ,
+  kNormalX,
+  kNormalY,
+  kNormalZ,
+  kArea,
+  kIrradianceR,
+  kIrradianceG,
+  kIrradianceB
+};
 inline constexpr std::size_t kPlaneCount = 10;
 
-/// One node of an octree: 64 bytes, as it stands in the file. Nodes are in breadth-first order, the children of a node side by side
-/// and those of successive nodes in succession; a node's samples are one range, which its children divide in order.
+/// One node of an octree: 64 bytes, as it stands in the file. Nodes are in breadth-first order, the children
+/// of a node side by side and those of successive nodes in succession; a node's samples are one range, which
+/// its children divide in order.
 struct OctreeNode {
-  float centre[3];        // centroid of the samples, weighted by E_t A summed over channels (by A where that is zero)
-  float radius;           // largest distance of a sample from the centre
-  float power[3];         // sum of E_t A
-  float second_moment[3]; // sum of E_t A |x - centre|^2
-  float first_moment[3];  // length of sum of E_t A (x - centre)
-  std::uint32_t first_child;   // index of the first child; 0 for a leaf
+  float
+      centre[3];  // centroid of the samples, weighted by E_t A summed over channels (by A where that is zero)
+  float radius;   // largest distance of a sample from the centre
+  float power[3];             // sum of E_t A
+  float second_moment[3];     // sum of E_t A |x - centre|^2
+  float first_moment[3];      // length of sum of E_t A (x - centre)
+  std::uint32_t first_child;  // index of the first child; 0 for a leaf
   std::uint32_t first_sample;
   std::uint32_t packed_counts;  // bits 0-27: samples, bits 28-31: children
 

@@ -12,9 +12,10 @@ inline constexpr std::uint32_t kCacheVersion = 1;
 /// Writes a cache; the file appears under its name only when complete. Throws Error(kIo, path).
 void save_cache(const Cache& cache, const std::string& path);
 
-/// Maps a cache file and checks all of it: structure, checksums, links, and that every number is finite and in its
-/// range; nothing in the returned cache needs to be checked again. Throws Error with `path` or "path: byte N" as the place: kNotFound, kIo,
-/// kNotACache, kNewerVersion, kTruncated, kDamaged (naming the section).
+/// Maps a cache file and checks all of it: structure, checksums, links, and that every number is finite and
+/// in its range; nothing in the returned cache needs to be checked again. Throws Error with `path` or "path:
+/// byte N" as the place: kNotFound, kIo, kNotACache, kNewerVersion, kTruncated, kDamaged (naming the
+/// section).
 Cache load_cache(const std::string& path);
 
 /// Whether a file begins like a cache. False for what cannot be read.

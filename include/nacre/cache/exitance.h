@@ -10,16 +10,17 @@
 
 namespace nacre {
 
-/// One group of a cache seen with one material and one tolerance. M_o is a function of position and these alone. The cache has
-/// to outlive it.
+/// One group of a cache seen with one material and one tolerance. M_o is a function of position and these
+/// alone. The cache has to outlive it.
 class Exitance {
  public:
   /// `tolerance` is the relative error of the sum against eval_exact; 0 sums every sample.
   Exitance(const CacheGroup& group, const Medium& medium, double tolerance);
 
-  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at a point in scene units, by descent of the octree: a node stands for
-  /// its samples where a second-order bound of the error this makes is small against the whole sum. Counts evaluated nodes and
-  /// samples in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy; the error bound is nacre's own.
+  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at a point in scene units, by descent of the octree:
+  /// a node stands for its samples where a second-order bound of the error this makes is small against the
+  /// whole sum. Counts evaluated nodes and samples in `evaluations`. Source: Jensen & Buhler 2002 for the
+  /// hierarchy; the error bound is nacre's own.
   Rgb eval(const Vec3& x, std::uint64_t& evaluations) const noexcept;
   /// The same sum over every sample, in octree order.
   Rgb eval_exact(const Vec3& x, std::uint64_t& evaluations) const noexcept;

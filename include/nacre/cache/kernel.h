@@ -1,4 +1,5 @@
-// The three channels of a diffusion profile as a table over distance, with bounds on their slope and curvature.
+// The three channels of a diffusion profile as a table over distance, with bounds on their slope and
+// curvature.
 #pragma once
 
 #include <array>
@@ -10,8 +11,9 @@
 
 namespace nacre {
 
-/// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells. Linear
-/// interpolation within a cell is right to 3e-6 relative while sigma_tr r < 1, and to 1e-4 of the value at sigma_tr r = 15.
+/// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells.
+/// Linear interpolation within a cell is right to 3e-6 relative while sigma_tr r < 1, and to 1e-4 of the
+/// value at sigma_tr r = 15.
 class Kernel {
  public:
   explicit Kernel(const std::array<Profile, 3>& profiles);
@@ -24,10 +26,11 @@ class Kernel {
   Triple eval(float r2) const noexcept {
     const Cell& cell = cells_[index(r2)];
     const float t = static_cast<float>(bits(r2) & kFractionMask) * kFractionScale;
-    return {{cell.value[0] + t * cell.delta[0], cell.value[1] + t * cell.delta[1], cell.value[2] + t * cell.delta[2]}};
+    return {{cell.value[0] + t * cell.delta[0], cell.value[1] + t * cell.delta[1],
+             cell.value[2] + t * cell.delta[2]}};
   }
-  /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular profiles (R_d of the
-  /// others hardly varies over a sample's share).
+  /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
+  /// profiles (R_d of the others hardly varies over a sample's share).
   Triple eval_disc(float r2, float area) const noexcept;
   bool singular() const noexcept { return singular_; }
 

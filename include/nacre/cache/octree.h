@@ -7,9 +7,10 @@
 
 namespace nacre {
 
-/// Sorts samples along a Morton curve and builds the octree over them; at most kMaxLeafSamples per leaf except
-/// where that many share one cell of the finest level. The group owns its data through `storage`, which is added to.
-/// The result depends on the samples alone. Throws Error(kLimit) above kMaxSamplesPerGroup.
+/// Sorts samples along a Morton curve and builds the octree over them; at most kMaxLeafSamples per leaf
+/// except where that many share one cell of the finest level. The group owns its data through `storage`,
+/// which is added to. The result depends on the samples alone. Throws Error(kLimit) above
+/// kMaxSamplesPerGroup.
 CacheGroup build_group(std::string name, double surface_area, const SurfaceSamples& samples,
                        std::vector<std::shared_ptr<const void>>& storage);
 

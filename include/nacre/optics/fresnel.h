@@ -7,8 +7,8 @@
 
 namespace nacre {
 
-/// Unpolarized reflectance F_r of a smooth boundary for light that arrives at angle acos(cos_i), cos_i in [0, 1];
-/// eta = n_transmitted / n_incident. 1 under total internal reflection. F_t is 1 - F_r.
+/// Unpolarized reflectance F_r of a smooth boundary for light that arrives at angle acos(cos_i), cos_i in [0,
+/// 1]; eta = n_transmitted / n_incident. 1 under total internal reflection. F_t is 1 - F_r.
 template <class Real>
 Real fresnel_reflectance(Real cos_i, Real eta) noexcept {
   const Real sin2_t = (1 - cos_i * cos_i) / (eta * eta);
@@ -37,8 +37,9 @@ inline Vec3 reflect(const Vec3& direction, const Vec3& n) noexcept {
   return n * (2 * dot(direction, n)) - direction;
 }
 
-/// Direction of the transmitted ray, away from the surface on the other side, for `direction` pointing away from the
-/// surface on the side of n (dot > 0); eta = n_transmitted / n_incident. False under total internal reflection.
+/// Direction of the transmitted ray, away from the surface on the other side, for `direction` pointing away
+/// from the surface on the side of n (dot > 0); eta = n_transmitted / n_incident. False under total internal
+/// reflection.
 inline bool refract(const Vec3& direction, const Vec3& n, float eta, Vec3& transmitted) noexcept {
   const float cos_i = dot(direction, n);
   const float sin2_t = (1 - cos_i * cos_i) / (eta * eta);

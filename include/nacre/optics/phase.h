@@ -7,8 +7,8 @@
 
 namespace nacre {
 
-/// Per steradian, normalized to 1 over the sphere; `cosine` is between the directions of propagation before and after, so
-/// that g > 0 is forward. Source: Henyey & Greenstein 1941.
+/// Per steradian, normalized to 1 over the sphere; `cosine` is between the directions of propagation before
+/// and after, so that g > 0 is forward. Source: Henyey & Greenstein 1941.
 inline float eval_henyey_greenstein(float cosine, float g) noexcept {
   const float d = 1 + g * g - 2 * g * cosine;
   return (1 - g * g) / (4 * kPi * d * std::sqrt(d));

@@ -7,9 +7,9 @@
 
 namespace nacre {
 
-/// One channel of a profile, R(r) per unit area, decreasing in r. Every profile that nacre knows is a sum of two
-/// terms exp(-sigma d) (a/d^3 + b/d^2 + c/d), d = sqrt(r^2 + z^2), so that all evaluators take any of them. Lengths are in
-/// whatever unit the coefficients were given in.
+/// One channel of a profile, R(r) per unit area, decreasing in r. Every profile that nacre knows is a sum of
+/// two terms exp(-sigma d) (a/d^3 + b/d^2 + c/d), d = sqrt(r^2 + z^2), so that all evaluators take any of
+/// them. Lengths are in whatever unit the coefficients were given in.
 struct Profile {
   struct Term {
     double z = 1, sigma = 0, a = 0, b = 0, c = 0;
@@ -29,7 +29,8 @@ struct ProfileValue {
 double eval_profile(const Profile& profile, double r) noexcept;
 ProfileValue eval_profile_derivatives(const Profile& profile, double r) noexcept;
 
-/// Classic dipole. Source: Jensen et al. 2001 with the corrected extrapolation (both terms dimensionally sound).
+/// Classic dipole. Source: Jensen et al. 2001 with the corrected extrapolation (both terms dimensionally
+/// sound).
 Profile make_dipole(double sigma_s_prime, double sigma_a, double eta);
 /// Dipole of improved diffusion theory with exact Fresnel moments. Source: d'Eon 2012.
 Profile make_better_dipole(double sigma_s_prime, double sigma_a, double eta);

@@ -13,9 +13,9 @@ namespace nacre {
 /// Everything that tracing light needs. The scene has to outlive it unchanged.
 struct World {
   const Scene* scene;
-  RayTracer tracer;                      // mesh i is Scene::shapes[i]
-  std::vector<Bsdf> bsdfs;               // parallel to Scene::shapes
-  std::vector<Distribution> emitters;    // parallel to Scene::lights: triangles of area lights by area
+  RayTracer tracer;                    // mesh i is Scene::shapes[i]
+  std::vector<Bsdf> bsdfs;             // parallel to Scene::shapes
+  std::vector<Distribution> emitters;  // parallel to Scene::lights: triangles of area lights by area
   bool shadows = true;
 
   const Shape& shape(const Hit& hit) const { return scene->shapes[hit.mesh]; }

@@ -1,0 +1,60 @@
+// The bake: from a scene to a cache.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "nacre/base/progress.h"
+#include "nacre/base/report.h"
+#include "nacre/cache/cache.h"
+#include "nacre/transport/world.h"
+
+namespace nacre {
+
+struct BakeParams {
+  std::optional<double> points;      // total over all groups
+  std::optional<double> spacing_mm;  // of every group; neither: 0.65 of the smallest mean free path
+  std::optional<int>
+      irradiance_samples;      // per point and light; none: the scene's, else kDefaultIrradianceSamples
+  std::optional<int> bounces;  // of light between opaque surfaces; none: what the scene's integrator gives
+  bool shadows = true;
+  std::uint64_t seed = 0;
+};
+
+inline constexpr double kDefaultSpacing = 0.65;  // mean free paths
+inline constexpr int kDefaultIrradianceSamples = 64;
+inline constexpr double kMostPoints = 200e6;
+
+/// What a bake is going to do with one group.
+struct GroupPlan {
+  std::string name;
+  double surface_area = 0;  // scene units^2
+  double points = 0;        // expected
+  double spacing_mm = 0;
+  int irradiance_samples = 0;
+  int bounces = 0;
+};
+struct BakePlan {
+  std::vector<GroupPlan> groups;  // parallel to Scene::media
+  double points = 0;              // over all groups
+  double bytes = 0;               // of the cache file, about
+};
+
+/// Throws Error(kLimit) above kMostPoints, with the advice to check `scale`; Error(kValue) when no shape is
+/// translucent or one has no surface.
+BakePlan plan_bake(const Scene& scene, const BakeParams& params);
+
+/// Places samples on every translucent group and computes the transmitted irradiance there. Depends on scene
+/// and params alone, not on threads.
+Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
+           Report& report);
+
+/// Irradiance E_t transmitted into a medium of relative index eta at points on its boundary (unit outward
+/// normals), from every light with `samples` connections to each area light and, with bounces, `samples` rays
+/// for light off opaque surfaces.
+std::vector<Rgb> compute_irradiance(const World& world, std::span<const Vec3> positions,
+                                    std::span<const Vec3> normals, float eta, int samples, int bounces,
+                                    std::uint64_t seed, Progress& progress);
+
+}  // namespace nacre

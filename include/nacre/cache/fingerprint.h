@@ -1,0 +1,26 @@
+// What a cache's numbers depend on, as named values that can be compared and shown.
+#pragma once
+
+#include <string>
+
+#include "nacre/cache/cache.h"
+#include "nacre/scene/scene.h"
+
+namespace nacre {
+
+/// The parts of a scene that a cache depends on: content of each shape, not its file's name ("shape
+/// bunny/geometry"), which group it belongs to, lights ("light key/position"), eta of each medium, shadows,
+/// bounces and, where light bounces, reflectances. `bounces[m]` is the number of bounces baked for medium m.
+KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows);
+
+/// The bounces that a fingerprint was made with, for `groups` media; missing ones are 0.
+std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups);
+
+/// A 32-digit hash of a fingerprint.
+std::string fingerprint_digest(const KeyValues& fingerprint);
+
+/// What differs between a cache's fingerprint and a scene's, in one line: "light key/position was 0 1 2 and
+/// is 0 1 3; ...", or "" if nothing does.
+std::string describe_mismatch(const KeyValues& cached, const KeyValues& current);
+
+}  // namespace nacre

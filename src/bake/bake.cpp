@@ -1,0 +1,144 @@
+// Planning a bake and running it group by group.
+#include "nacre/bake/bake.h"
+
+#include <fmt/format.h>
+
+#include "bake/area_shares.h"
+#include "bake/group_surface.h"
+#include "bake/placement.h"
+#include "nacre/base/random.h"
+#include "nacre/base/version.h"
+#include "nacre/cache/fingerprint.h"
+#include "nacre/cache/octree.h"
+
+namespace nacre {
+namespace {
+
+// Per sample in the file: ten planes and its part of the nodes, about one to five samples.
+constexpr double kBytesPerSample = 4.0 * static_cast<double>(kPlaneCount) + 64.0 / 3;
+
+std::vector<const Mesh*> group_meshes(const Scene& scene, std::size_t medium) {
+  std::vector<const Mesh*> meshes;
+  for (const Shape& shape : scene.shapes)
+    if (shape.medium == static_cast<int>(medium)) meshes.push_back(&shape.mesh);
+  return meshes;
+}
+
+std::string text(const Rgb& c) { return fmt::format("{} {} {}", c.x, c.y, c.z); }
+
+KeyValues make_info(const Scene& scene, const BakePlan& plan, const BakeParams& params,
+                    const std::vector<CacheGroup>& groups) {
+  KeyValues info{{"nacre", kVersion}, {"seed", fmt::format("{}", params.seed)}};
+  for (std::size_t m = 0; m < groups.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    const std::string name = "group " + groups[m].name;
+    const double count = static_cast<double>(groups[m].size());
+    info.emplace_back(name + "/spacing_mm",
+                      fmt::format("{:.6g}", hexagonal_spacing(groups[m].surface_area, count) * medium.scale));
+    info.emplace_back(name + "/mm_per_unit", fmt::format("{}", medium.scale));
+    info.emplace_back(name + "/irradiance_samples", fmt::format("{}", plan.groups[m].irradiance_samples));
+    info.emplace_back(name + "/material", medium.material);
+    info.emplace_back(name + "/sigma_s", text(medium.sigma_s));
+    info.emplace_back(name + "/sigma_a", text(medium.sigma_a));
+    info.emplace_back(name + "/g", text(medium.g));
+  }
+  return info;
+}
+
+SurfaceSamples place_samples(const GroupSurface& surface, double points, std::uint64_t seed,
+                             Progress& progress) {
+  std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
+  SurfaceSamples samples;
+  samples.areas = compute_area_shares(surface, placed, progress);
+  samples.positions.reserve(placed.size());
+  samples.normals.reserve(placed.size());
+  for (const PlacedPoint& point : placed) {
+    samples.positions.push_back(point.position);
+    samples.normals.push_back(point.normal);
+  }
+  return samples;
+}
+
+}  // namespace
+
+BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
+  BakePlan plan;
+  std::vector<double> weights;  // area in squared mean free paths
+  double total_weight = 0;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    const SubsurfaceSettings& settings = scene.subsurface[m];
+    GroupPlan group;
+    group.name = medium_name(scene, m);
+    for (const Mesh* mesh : group_meshes(scene, m)) group.surface_area += surface_area(*mesh);
+    if (!(group.surface_area > 0))
+      fail(ErrorCode::kValue, medium.place, "the shapes of medium {} have no surface to put samples on",
+           group.name);
+    const double length = static_cast<double>(smallest_mean_free_path(medium)) / medium.scale;  // scene units
+    if (!std::isfinite(length))
+      fail(ErrorCode::kValue, medium.place,
+           "medium {} neither scatters nor absorbs; give it coefficients above 0", group.name);
+    weights.push_back(group.surface_area / square(length));
+    total_weight += weights.back();
+    const double spacing = params.spacing_mm ? *params.spacing_mm / medium.scale : kDefaultSpacing * length;
+    group.points = 2 / std::sqrt(3.0) * group.surface_area / square(spacing);
+    if (!params.spacing_mm) group.points *= settings.sample_multiplier;
+    group.irradiance_samples = params.irradiance_samples.value_or(
+        settings.irradiance_samples > 0 ? settings.irradiance_samples : kDefaultIrradianceSamples);
+    group.bounces = params.bounces.value_or(settings.indirect ? scene.integrator.bounces() : 0);
+    plan.groups.push_back(group);
+  }
+  if (plan.groups.empty())
+    fail(ErrorCode::kValue, scene.path, "no shape is translucent; give one a <subsurface type=\"dipole\">");
+  for (std::size_t m = 0; m < plan.groups.size(); ++m) {
+    GroupPlan& group = plan.groups[m];
+    if (params.points) group.points = *params.points * weights[m] / total_weight;
+    group.points = std::max(group.points, 1.0);
+    group.spacing_mm = hexagonal_spacing(group.surface_area, group.points) * scene.media[m].scale;
+    plan.points += group.points;
+  }
+  plan.bytes = 4096 + plan.points * kBytesPerSample;
+  if (plan.points > kMostPoints)
+    fail(ErrorCode::kLimit, scene.path,
+         "the bake would need {:.3g} samples, more than {:.0f} million; check `scale` (mm per scene unit) or "
+         "give --spacing or --points",
+         plan.points, kMostPoints / 1e6);
+  return plan;
+}
+
+Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
+           Report& report) {
+  const Scene& scene = *world.scene;
+  Cache cache;
+  std::vector<std::shared_ptr<const void>> storage;
+  std::vector<int> bounces;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const GroupPlan& group = plan.groups[m];
+    SurfaceSamples samples;
+    double area = 0;
+    {
+      const StageTimer timer(report, "place_samples");
+      const GroupSurface surface = make_group_surface(group_meshes(scene, m));
+      area = surface.areas.total();
+      samples = place_samples(surface, group.points, hash_words(params.seed, m, 0), progress);
+    }
+    {
+      const StageTimer timer(report, "irradiance");
+      samples.irradiance = compute_irradiance(world, samples.positions, samples.normals, scene.media[m].eta(),
+                                              group.irradiance_samples, group.bounces,
+                                              hash_words(params.seed, m, 1), progress);
+    }
+    const StageTimer timer(report, "build_octree");
+    cache.groups.push_back(build_group(group.name, area, samples, storage));
+    bounces.push_back(group.bounces);
+    report.counts["points"] += cache.groups.back().size();
+    report.counts["octree_nodes"] += cache.groups.back().nodes.size();
+  }
+  const StageTimer timer(report, "fingerprint");
+  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows);
+  cache.info = make_info(scene, plan, params, cache.groups);
+  cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
+  return cache;
+}
+
+}  // namespace nacre

@@ -1,0 +1,171 @@
+// Making and comparing fingerprints.
+#include "nacre/cache/fingerprint.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+
+namespace nacre {
+namespace {
+
+using HashState = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
+
+HashState make_hash() {
+  HashState state(XXH3_createState(), &XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  return state;
+}
+
+std::string digest(const HashState& state) {
+  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+std::string hash_geometry(const Mesh& mesh) {
+  const HashState state = make_hash();
+  const std::uint64_t counts[2] = {mesh.positions.size(), mesh.triangles.size()};
+  XXH3_128bits_update(state.get(), counts, sizeof counts);
+  XXH3_128bits_update(state.get(), mesh.positions.data(), mesh.positions.size() * sizeof(Vec3));
+  XXH3_128bits_update(state.get(), mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle));
+  return digest(state);
+}
+
+std::string text(const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); }
+
+class Fingerprinter {
+ public:
+  Fingerprinter(const Scene& scene, std::span<const int> bounces, bool shadows)
+      : scene_(scene), bounces_(bounces), shadows_(shadows) {}
+
+  KeyValues make() {
+    add("shadows", shadows_ ? "yes" : "no");
+    for (std::size_t m = 0; m < scene_.media.size(); ++m) {
+      const std::string name = "medium " + medium_name(scene_, m);
+      add(name + "/eta", fmt::format("{}", scene_.media[m].eta()));
+      add(name + "/bounces", fmt::format("{}", bounces_[m]));
+    }
+    for (const Shape& shape : scene_.shapes) {
+      if (casts_no_light(shape)) continue;
+      const std::string name = "shape " + shape.id;
+      add(name + "/geometry", hash_geometry(shape.mesh));
+      add(name + "/medium",
+          shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
+      if (bounce_matters() && shape.medium == kNone) add_surface(name, shape);
+    }
+    for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
+      name_ = "light " + light_name(scene_, i);
+      std::visit([&](const auto& light) { add_light(light); }, scene_.lights[i].model);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void add(const std::string& key, std::string value) {
+    // Shapes and lights may share an id with others; a repeated key still has to be told apart.
+    std::string unique = key;
+    for (int n = 2;
+         std::any_of(result_.begin(), result_.end(), [&](const auto& e) { return e.first == unique; }); ++n)
+      unique = fmt::format("{} ({})", key, n);
+    result_.emplace_back(std::move(unique), std::move(value));
+  }
+  bool bounce_matters() const {
+    return std::any_of(bounces_.begin(), bounces_.end(), [](int b) { return b > 0; });
+  }
+  // Without shadows and bounces an opaque shape that does not shine leaves no trace in the cache.
+  bool casts_no_light(const Shape& shape) const {
+    return shape.medium == kNone && shape.light == kNone && !shadows_ && !bounce_matters();
+  }
+  void add_surface(const std::string& name, const Shape& shape) {
+    if (shape.surface == kNone) return add(name + "/surface", "default");
+    const auto& model = scene_.surfaces[static_cast<std::size_t>(shape.surface)].model;
+    if (const auto* diffuse = std::get_if<DiffuseSurface>(&model))
+      add(name + "/surface", "diffuse " + text(diffuse->reflectance));
+    else if (const auto* plastic = std::get_if<PlasticSurface>(&model))
+      add(name + "/surface", fmt::format("plastic {} {} {} {}", text(plastic->diffuse_reflectance),
+                                         plastic->int_ior, plastic->ext_ior, plastic->nonlinear));
+    else
+      add(name + "/surface", "dielectric");
+  }
+  void add_light(const PointLight& light) {
+    add(name_ + "/position", text(light.position));
+    add(name_ + "/intensity", text(light.intensity));
+  }
+  void add_light(const DirectionalLight& light) {
+    add(name_ + "/direction", text(light.direction));
+    add(name_ + "/irradiance", text(light.irradiance));
+  }
+  void add_light(const AreaLight& light) {
+    add(name_ + "/shape", scene_.shapes[light.shape].id);
+    add(name_ + "/radiance", text(light.radiance));
+  }
+
+  const Scene& scene_;
+  std::span<const int> bounces_;
+  bool shadows_;
+  std::string name_;
+  KeyValues result_;
+};
+
+const std::string* find_value(const KeyValues& entries, const std::string& key) {
+  for (const auto& [k, v] : entries)
+    if (k == key) return &v;
+  return nullptr;
+}
+
+bool ends_with(const std::string& text, std::string_view end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+}  // namespace
+
+KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows) {
+  return Fingerprinter(scene, bounces, shadows).make();
+}
+
+std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups) {
+  std::vector<int> bounces;
+  for (const auto& [key, value] : fingerprint)
+    if (ends_with(key, "/bounces")) {
+      int count = 0;
+      std::from_chars(value.data(), value.data() + value.size(), count);
+      bounces.push_back(std::max(0, count));
+    }
+  bounces.resize(groups, 0);
+  return bounces;
+}
+
+std::string fingerprint_digest(const KeyValues& fingerprint) {
+  const HashState state = make_hash();
+  for (const auto& [key, value] : fingerprint) {
+    XXH3_128bits_update(state.get(), key.c_str(), key.size() + 1);
+    XXH3_128bits_update(state.get(), value.c_str(), value.size() + 1);
+  }
+  return digest(state);
+}
+
+std::string describe_mismatch(const KeyValues& cached, const KeyValues& current) {
+  std::string differences;
+  int count = 0;
+  const auto note = [&](const std::string& difference) {
+    if (++count <= 3) differences += (count > 1 ? "; " : "") + difference;
+  };
+  for (const auto& [key, value] : cached) {
+    const std::string* now = find_value(current, key);
+    if (!now)
+      note(key + " is gone");
+    else if (*now != value)
+      note(ends_with(key, "/geometry") ? key + " has changed"
+                                       : fmt::format("{} was {} and is {}", key, value, *now));
+  }
+  for (const auto& [key, value] : current)
+    if (!find_value(cached, key))
+      note(ends_with(key, "/geometry") ? key + " is new" : fmt::format("{} is new ({})", key, value));
+  if (count > 3) differences += fmt::format("; and {} more", count - 3);
+  return differences;
+}
+
+}  // namespace nacre
