@@ -1,0 +1,56 @@
+// Channels of an image.
+#include "render/pixels.h"
+
+namespace nacre {
+
+PixelBuffer::PixelBuffer(int buffer_width, int buffer_height) : width(buffer_width), height(buffer_height) {
+  const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  for (auto& layer : layers) layer.assign(count, Rgb(0, 0, 0));
+  coverage.assign(count, 0.0f);
+  position.assign(count, Vec3(0, 0, 0));
+  normal.assign(count, Vec3(0, 0, 0));
+  depth.assign(count, 0.0f);
+  object_id.assign(count, 0.0f);
+}
+
+Image PixelBuffer::make_image(const RenderParams& params) const {
+  Image image;
+  image.full_width = params.width;
+  image.full_height = params.height;
+  image.x = params.crop_x;
+  image.y = params.crop_y;
+  image.width = width;
+  image.height = height;
+  const std::size_t count = coverage.size();
+  const float scale = 1.0f / static_cast<float>(params.samples_per_pixel);
+  const auto add = [&](const std::string& name, const auto& value) {
+    Channel channel{name, std::vector<float>(count)};
+    for (std::size_t i = 0; i < count; ++i) channel.values[i] = value(i);
+    image.channels.push_back(std::move(channel));
+  };
+  const char* const kRgbNames[] = {"R", "G", "B"};
+  const char* const kXyzNames[] = {"X", "Y", "Z"};
+  const char* const kLayerNames[kLayerCount] = {"diffusion", "specular", "surface"};
+  // Beauty is the sum of the stored layers, rounded as a reader of the file would do it: from left to right.
+  for (int k = 0; k < 3; ++k)
+    add(kRgbNames[k], [&](std::size_t i) {
+      return layers[0][i][k] * scale + layers[1][i][k] * scale + layers[2][i][k] * scale;
+    });
+  add("A", [&](std::size_t i) { return coverage[i] * scale; });
+  if (params.aovs.layers)
+    for (std::size_t l = 0; l < kLayerCount; ++l)
+      for (int k = 0; k < 3; ++k)
+        add(fmt::format("{}.{}", kLayerNames[l], kRgbNames[k]),
+            [&](std::size_t i) { return layers[l][i][k] * scale; });
+  for (int k = 0; k < 3; ++k) {
+    if (params.aovs.position)
+      add(fmt::format("position.{}", kXyzNames[k]), [&](std::size_t i) { return position[i][k]; });
+    if (params.aovs.normal)
+      add(fmt::format("normal.{}", kXyzNames[k]), [&](std::size_t i) { return normal[i][k]; });
+  }
+  if (params.aovs.depth) add("depth.Z", [&](std::size_t i) { return depth[i]; });
+  if (params.aovs.object_id) add("object.id", [&](std::size_t i) { return object_id[i]; });
+  return image;
+}
+
+}  // namespace nacre
