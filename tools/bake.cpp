@@ -1,0 +1,47 @@
+// nacre bake: a scene's irradiance into a cache file.
+#include "common.h"
+#include "nacre/cache/cache_file.h"
+
+namespace nacre::tools {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  SceneOptions scene;
+  BakeOptions bake;
+  std::string output;
+};
+
+void run(const Options& options, const std::string& command_line) {
+  Session session(options.common, command_line);
+  check_writable(options.output);
+  const Scene scene = load_scene(options.scene, session);
+  const BakeParams params = options.bake.params(options.common);
+  plan_bake(scene, params);  // refuses absurd sizes before anything is built
+  const World world = [&] {
+    const StageTimer timer(session.report(), "build_bvh");
+    return make_world(scene, params.shadows);
+  }();
+  const Cache cache = run_bake(world, params, session);
+  {
+    const StageTimer timer(session.report(), "write_cache");
+    save_cache(cache, options.output);
+  }
+  session.progress().say(fmt::format("{}: {} samples", options.output, session.report().counts["points"]));
+  session.finish();
+}
+
+}  // namespace
+
+void add_bake_command(CLI::App& app, const std::string& command_line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("bake", "Bake the irradiance on translucent surfaces into a cache file");
+  add_scene_options(*command, options->scene);
+  command->add_option("-o,--output", options->output, "Cache file to write")->required();
+  add_bake_options(*command, options->bake);
+  add_common_options(*command, options->common);
+  command->callback([options, command_line] { run(*options, command_line); });
+}
+
+}  // namespace nacre::tools

@@ -1,0 +1,180 @@
+// Options, scenes, reports.
+#include "common.h"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "nacre/base/file.h"
+#include "nacre/base/parallel.h"
+#include "nacre/base/version.h"
+#include "nacre/geometry/mesh_file.h"
+#include "nacre/scene/scene_file.h"
+#include "nacre/scene/validity.h"
+
+namespace nacre::tools {
+
+class ThreadLimitHolder {
+ public:
+  explicit ThreadLimitHolder(int threads) : limit(threads) {}
+  ThreadLimit limit;
+};
+
+namespace {
+
+ProgressStyle progress_style(bool quiet) {
+  if (quiet) return ProgressStyle::kNone;
+  return ::isatty(STDERR_FILENO) ? ProgressStyle::kBar : ProgressStyle::kLines;
+}
+
+Defines parse_defines(const std::vector<std::string>& texts) {
+  Defines defines;
+  for (const std::string& text : texts) {
+    const auto equals = text.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw UsageError("-D " + text + ": write it as name=value");
+    defines[text.substr(0, equals)] = text.substr(equals + 1);
+  }
+  return defines;
+}
+
+}  // namespace
+
+Session::Session(const CommonOptions& options, std::string command)
+    : options_(options),
+      command_(std::move(command)),
+      limit_(new ThreadLimitHolder(options.threads), [](ThreadLimitHolder* holder) { delete holder; }),
+      progress_(progress_style(options.quiet)) {
+  if (!options_.report_path.empty()) check_writable(options_.report_path);
+}
+
+void Session::warn(const Warnings& warnings) {
+  for (const std::string& warning : warnings) fmt::print(stderr, "nacre: warning: {}\n", warning);
+}
+
+void Session::finish() {
+  if (options_.report_path.empty()) return;
+  nlohmann::ordered_json json;
+  json["nacre"] = kVersion;
+  json["command"] = command_;
+  json["threads"] = thread_count();
+  json["simd"] = "scalar";
+  for (const auto& [stage, seconds] : report_.seconds) json["seconds"][stage] = seconds;
+  json["seconds"]["total"] = watch_.seconds();
+  json["counts"] = report_.counts;
+  if (!report_.notes.empty()) json["notes"] = report_.notes;
+  json["peak_rss_bytes"] = peak_memory_bytes();
+  const std::string text = json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  AtomicFile file(options_.report_path);
+  file.write(text.data(), text.size());
+  file.commit();
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("--threads", options.threads, "Number of threads (default: all cores)")
+      ->check(CLI::Range(1, 4096));
+  command.add_option("--seed", options.seed, "Seed of all random numbers (default: 0)");
+  command.add_flag("--quiet", options.quiet, "No progress; warnings and errors only");
+  command.add_option("--report", options.report_path, "Write times and counts to this JSON file");
+}
+
+void add_scene_options(CLI::App& command, SceneOptions& options) {
+  command.add_option("scene", options.path, "Scene file (.xml), or a mesh file (.obj .ply .stl .off)")
+      ->required();
+  command.add_option("-D", options.defines, "name=value: fills $name in the scene file")
+      ->allow_extra_args(false);
+  command.add_option("--material", options.material, "Mesh file: preset it is made of (default: Marble)");
+  command.add_option("--height", options.height, "Mesh file: height of the object in mm (default: 50)");
+}
+
+Scene load_scene(const SceneOptions& options, Session& session) {
+  const StageTimer timer(session.report(), "load");
+  Scene scene;
+  if (is_mesh_file_name(options.path)) {
+    if (!options.defines.empty())
+      throw UsageError("-D fills names in a scene file; " + options.path + " is a mesh");
+    const std::string material = options.material.empty() ? "Marble" : options.material;
+    const Preset* preset = find_preset(material);
+    if (!preset)
+      fail(ErrorCode::kValue, "--material",
+           "there is no material '{}'; did you mean one of {}? `nacre materials` lists them", material,
+           suggest_presets(material));
+    scene = make_showcase_scene(options.path, make_medium(*preset), options.height);
+  } else {
+    if (!options.material.empty())
+      throw UsageError("--material goes with a mesh file; a scene file names its own");
+    scene = nacre::load_scene(options.path, parse_defines(options.defines));
+  }
+  session.warn(scene.warnings);
+  session.warn(check_validity(scene));
+  std::uint64_t triangles = 0;
+  for (const Shape& shape : scene.shapes) triangles += shape.mesh.triangles.size();
+  session.report().counts["triangles"] = triangles;
+  return scene;
+}
+
+void add_bake_options(CLI::App& command, BakeOptions& options) {
+  auto* points = command.add_option("--points", options.points, "Total number of samples, about")
+                     ->check(CLI::PositiveNumber);
+  command
+      .add_option("--spacing", options.spacing,
+                  "Distance of samples in mm (default: 0.65 of the smallest mean free path)")
+      ->check(CLI::PositiveNumber)
+      ->excludes(points);
+  command
+      .add_option("--irradiance-samples", options.irradiance_samples,
+                  "Connections to each area light per sample (default: the scene's irrSamples, else 64)")
+      ->check(CLI::Range(1, 1 << 20));
+  command
+      .add_option(
+          "--bounces", options.bounces,
+          "Bounces of light off opaque surfaces before it enters (default: as the scene's integrator)")
+      ->check(CLI::Range(0, 1000));
+  command.add_flag("--no-shadows", options.no_shadows, "Nothing blocks light");
+}
+
+BakeParams BakeOptions::params(const CommonOptions& common) const {
+  BakeParams result;
+  result.points = points;
+  result.spacing_mm = spacing;
+  result.irradiance_samples = irradiance_samples;
+  result.bounces = bounces;
+  result.shadows = !no_shadows;
+  result.seed = common.seed;
+  return result;
+}
+
+Cache run_bake(const World& world, const BakeParams& params, Session& session) {
+  const BakePlan plan = plan_bake(*world.scene, params);
+  for (const GroupPlan& group : plan.groups)
+    session.progress().say(
+        fmt::format("{}: about {:.0f} samples, {:.3g} mm apart", group.name, group.points, group.spacing_mm));
+  session.progress().say(
+      fmt::format("cache: about {:.0f} samples, {}", plan.points, format_bytes(plan.bytes)));
+  return bake(world, plan, params, session.progress(), session.report());
+}
+
+void check_writable(const std::string& path) { const AtomicFile probe(path); }
+
+std::array<int, 2> parse_size(const std::string& text, const std::string& option) {
+  std::array<int, 2> size{};
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, size[0]);
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
+    const auto second = std::from_chars(first.ptr + 1, end, size[1]);
+    if (second.ec == std::errc() && second.ptr == end && size[0] >= 1 && size[1] >= 1 && size[0] <= 65536 &&
+        size[1] <= 65536)
+      return size;
+  }
+  throw UsageError(option + " " + text + ": write it as WIDTHxHEIGHT in pixels, at most 65536 each");
+}
+
+std::string format_bytes(double bytes) {
+  const char* const units[] = {"bytes", "kB", "MB", "GB", "TB"};
+  int unit = 0;
+  for (; bytes >= 1000 && unit < 4; ++unit) bytes /= 1000;
+  return fmt::format("{:.3g} {}", bytes, units[unit]);
+}
+
+}  // namespace nacre::tools

@@ -1,0 +1,181 @@
+// nacre info: what a file holds, and whether it is sound.
+#include <algorithm>
+#include <filesystem>
+
+#include "common.h"
+#include "nacre/cache/blotch.h"
+#include "nacre/cache/cache_file.h"
+#include "nacre/cache/fingerprint.h"
+#include "nacre/geometry/mesh_file.h"
+#include "nacre/geometry/topology.h"
+#include "nacre/render/image_file.h"
+#include "nacre/scene/validity.h"
+
+namespace nacre::tools {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  SceneOptions scene;
+  bool check = false;
+};
+
+std::string vector_text(const Vec3& v) { return fmt::format("{:.4g} {:.4g} {:.4g}", v.x, v.y, v.z); }
+
+void print_topology(const TopologyReport& r, const char* indent) {
+  fmt::print("{}{} triangles, {} vertices, {} pieces\n", indent, r.triangles, r.vertices, r.components);
+  fmt::print("{}size {}, area {:.6g}", indent, vector_text(r.box.isEmpty() ? Vec3(0, 0, 0) : r.box.size()),
+             r.area);
+  if (r.closed()) fmt::print(", volume {:.6g}", r.volume);
+  fmt::print("\n{}{}\n", indent,
+             r.closed()
+                 ? "closed"
+                 : fmt::format("open: {} boundary edges in {} loops", r.boundary_edges, r.boundary_loops));
+  fmt::print("{}non-manifold edges {}, flipped edges {}, duplicate faces {}, degenerate triangles {}\n",
+             indent, r.non_manifold_edges, r.flipped_edges, r.duplicate_faces, r.degenerate_triangles);
+}
+
+// Returns whether anything is wrong.
+bool show_mesh(const std::string& path) {
+  Warnings warnings;
+  const Mesh mesh = load_mesh(path, warnings);
+  const TopologyReport report = analyse_topology(mesh);
+  fmt::print("mesh {}\n", path);
+  print_topology(report, "  ");
+  const std::string problems = describe_problems(report);
+  if (!problems.empty()) warnings.push_back(path + ": " + problems);
+  for (const std::string& warning : warnings) fmt::print("  warning: {}\n", warning);
+  return !warnings.empty();
+}
+
+void show_density(const CacheGroup& group, double mm_per_unit) {
+  const double spacing =
+      hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * mm_per_unit;
+  fmt::print("  spacing {:.4g} mm: serves mean free paths down to {:.3g} mm\n", spacing,
+             spacing / spacing_for_blotch(kAcceptableBlotch));
+}
+
+void show_group(const CacheGroup& group, const KeyValues& info) {
+  fmt::print("group {}\n", group.name);
+  fmt::print("  {} samples, {} octree nodes, surface {:.6g} scene units^2\n", group.size(),
+             group.nodes.size(), group.surface_area);
+  double mm_per_unit = 1;
+  for (const auto& [key, value] : info)
+    if (key == "group " + group.name + "/mm_per_unit") mm_per_unit = std::strtod(value.c_str(), nullptr);
+  if (group.size() == 0) return;
+  show_density(group, mm_per_unit);
+  double area = 0;
+  std::array<double, 3> power{};
+  float least = group.area(0), most = least;
+  std::size_t dark = 0;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const float a = group.area(i);
+    const Rgb e = group.irradiance(i);
+    area += a;
+    least = std::min(least, a);
+    most = std::max(most, a);
+    dark += is_black(e);
+    for (int k = 0; k < 3; ++k) power[static_cast<std::size_t>(k)] += static_cast<double>(a) * e[k];
+  }
+  const double mean = area / static_cast<double>(group.size());
+  fmt::print("  shares add up to {:.4f} of the surface; from {:.3g} to {:.3g} of their mean\n",
+             area / group.surface_area, least / mean, most / mean);
+  fmt::print("  mean transmitted irradiance {:.5g} {:.5g} {:.5g}; {:.1f} % of the samples are dark\n",
+             power[0] / area, power[1] / area, power[2] / area,
+             100.0 * static_cast<double>(dark) / static_cast<double>(group.size()));
+}
+
+void show_cache(const std::string& path) {
+  const Cache cache = load_cache(path);
+  fmt::print("cache {}: format version {}, sound\n", path, kCacheVersion);
+  for (const CacheGroup& group : cache.groups) show_group(group, cache.info);
+  fmt::print("recorded\n");
+  for (const auto& [key, value] : cache.info) fmt::print("  {}: {}\n", key, value);
+  fmt::print("depends on (fingerprint {})\n", fingerprint_digest(cache.fingerprint));
+  for (const auto& [key, value] : cache.fingerprint) fmt::print("  {}: {}\n", key, value);
+}
+
+void show_image(const std::string& path) {
+  const Image image = load_exr(path);
+  fmt::print("image {}: {}x{}", path, image.full_width, image.full_height);
+  if (image.width != image.full_width || image.height != image.full_height)
+    fmt::print(", of which {}x{} from ({}, {})", image.width, image.height, image.x, image.y);
+  fmt::print("\n");
+  for (const Channel& channel : image.channels) {
+    const auto [low, high] = std::minmax_element(channel.values.begin(), channel.values.end());
+    double sum = 0;
+    for (const float v : channel.values) sum += v;
+    fmt::print("  {:<12} mean {:.5g}, from {:.5g} to {:.5g}\n", channel.name,
+               sum / static_cast<double>(channel.values.size()), *low, *high);
+  }
+  for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", key, value);
+}
+
+bool show_scene(const SceneOptions& options, Session& session) {
+  const Scene scene = load_scene(options, session);
+  fmt::print("scene {}: {} shapes, {} media, {} lights, {} cameras\n", options.path, scene.shapes.size(),
+             scene.media.size(), scene.lights.size(), scene.cameras.size());
+  bool flawed = !scene.warnings.empty();
+  for (const Shape& shape : scene.shapes) {
+    fmt::print("shape {} ({}, {})\n", shape.id, shape.type, shape.place);
+    if (shape.medium != kNone)
+      fmt::print("  translucent: {}\n", medium_name(scene, static_cast<std::size_t>(shape.medium)));
+    print_topology(analyse_topology(shape.mesh), "  ");
+  }
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    const Reduced reduced = reduce(medium);
+    const MediumExtent extent = measure_medium(scene, m);
+    const float length = smallest_mean_free_path(medium);
+    fmt::print("medium {} ({}){}\n", medium_name(scene, m), medium.place,
+               medium.material.empty() ? "" : ": " + medium.material);
+    fmt::print("  sigma_s' {} 1/mm, sigma_a {} 1/mm, g {}, eta {:.4g}\n", vector_text(reduced.sigma_s_prime),
+               vector_text(medium.sigma_a), vector_text(medium.g), medium.eta());
+    fmt::print("  mean free path l' {} mm\n", vector_text(reduced.mean_free_path));
+    fmt::print("  size {} mm, {} of the smallest l'; thickness {:.3g} mm, {:.3g} l'\n",
+               vector_text(extent.size_mm), vector_text(extent.size_mm / length), extent.thickness_mm,
+               extent.thickness_mm / length);
+  }
+  if (!scene.media.empty()) {
+    const BakePlan plan = plan_bake(scene, {});
+    for (const GroupPlan& group : plan.groups)
+      fmt::print("bake {}: about {:.0f} samples, {:.3g} mm apart\n", group.name, group.points,
+                 group.spacing_mm);
+    fmt::print("cache: about {}\n", format_bytes(plan.bytes));
+  }
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    fmt::print("light {} ({})\n", light_name(scene, i), scene.lights[i].place);
+  for (const Camera& camera : scene.cameras) fmt::print("camera {} ({})\n", camera.id, camera.place);
+  return flawed;
+}
+
+void run(const Options& options, const std::string& command_line) {
+  Session session(options.common, command_line);
+  const std::string& path = options.scene.path;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  bool flawed = false;
+  if (is_cache_file(path) || extension == ".nacre")
+    show_cache(path);
+  else if (extension == ".exr" || extension == ".EXR")
+    show_image(path);
+  else if (is_mesh_file_name(path) && options.scene.material.empty())
+    flawed = show_mesh(path);
+  else
+    flawed = show_scene(options.scene, session);
+  session.finish();
+  if (options.check && flawed) fail(ErrorCode::kValue, path, "has the problems above");
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app, const std::string& command_line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("info", "Say what a scene, mesh, cache or image holds and whether it is sound");
+  add_scene_options(*command, options->scene);
+  command->add_flag("--check", options->check, "Exit with 1 when something is wrong with it");
+  add_common_options(*command, options->common);
+  command->callback([options, command_line] { run(*options, command_line); });
+}
+
+}  // namespace nacre::tools

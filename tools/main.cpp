@@ -1,0 +1,57 @@
+// The program: subcommands, errors, exit codes.
+#include <csignal>
+#include <new>
+
+#include "common.h"
+#include "nacre/base/error.h"
+#include "nacre/base/version.h"
+
+namespace {
+
+std::string join_arguments(int argc, char** argv) {
+  std::string line = "nacre";
+  for (int i = 1; i < argc; ++i) line += std::string(" ") + argv[i];
+  return line;
+}
+
+int report_error(const std::string& message, int code) {
+  fmt::print(stderr, "nacre: error: {}\n", message);
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A closed pipe is an error like any other, not a silent death.
+  std::signal(SIGPIPE, SIG_IGN);
+  CLI::App app{
+      "nacre renders translucent materials: bake irradiance once, render from any camera with any material"};
+  app.set_version_flag("--version", std::string("nacre ") + nacre::kVersion);
+  app.require_subcommand(1);
+  app.option_defaults()->always_capture_default(false);
+  const std::string line = join_arguments(argc, argv);
+  nacre::tools::add_bake_command(app, line);
+  nacre::tools::add_render_command(app, line);
+  nacre::tools::add_info_command(app, line);
+  nacre::tools::add_diff_command(app, line);
+  nacre::tools::add_materials_command(app, line);
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::RuntimeError& result) {
+    return result.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    return report_error(std::string(error.what()) + "; see `nacre --help`", 2);
+  } catch (const nacre::tools::UsageError& error) {
+    return report_error(error.what(), 2);
+  } catch (const nacre::Error& error) {
+    return report_error(error.what(), 1);
+  } catch (const std::bad_alloc&) {
+    return report_error(
+        "out of memory; use fewer samples (--spacing, --points) or a smaller picture (--size)", 1);
+  } catch (const std::exception& error) {
+    return report_error(error.what(), 1);
+  }
+}

@@ -1,0 +1,198 @@
+// nacre render: a picture of a scene.
+#include "nacre/render/render.h"
+
+#include <charconv>
+#include <filesystem>
+
+#include "common.h"
+#include "nacre/base/version.h"
+#include "nacre/cache/blotch.h"
+#include "nacre/cache/cache_file.h"
+#include "nacre/cache/fingerprint.h"
+
+namespace nacre::tools {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  SceneOptions scene;
+  BakeOptions bake;
+  std::string output, cache, camera, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  int samples_per_pixel = 0;
+  double tolerance = 0.01;
+  bool png = false;
+};
+
+AovSelection parse_aovs(const std::string& text) {
+  if (text == "all") return {};
+  AovSelection selection{false, false, false, false, false};
+  if (text == "none") return selection;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string name = text.substr(begin, end - begin);
+    if (name == "layers")
+      selection.layers = true;
+    else if (name == "position")
+      selection.position = true;
+    else if (name == "normal")
+      selection.normal = true;
+    else if (name == "depth")
+      selection.depth = true;
+    else if (name == "object")
+      selection.object_id = true;
+    else
+      throw UsageError("--aov " + name +
+                       ": use none, all, or a list of layers, position, normal, depth, object");
+    begin = end + 1;
+  }
+  return selection;
+}
+
+// "X,Y,WxH"
+void parse_crop(const std::string& text, RenderParams& params) {
+  const auto first = text.find(','), second = text.find(',', first == std::string::npos ? first : first + 1);
+  int x = -1, y = -1;
+  if (second != std::string::npos) {
+    char rest = 0;
+    if (std::sscanf(text.substr(0, second + 1).c_str(), "%d,%d%c", &x, &y, &rest) != 3) x = -1;
+  }
+  if (x < 0 || y < 0)
+    throw UsageError("--crop " + text + ": write it as X,Y,WIDTHxHEIGHT in pixels from the top left");
+  const auto size = parse_size(text.substr(second + 1), "--crop");
+  if (x > params.width - size[0] || y > params.height - size[1])
+    throw UsageError(
+        fmt::format("--crop {}: reaches outside the picture of {}x{}", text, params.width, params.height));
+  params.crop_x = x;
+  params.crop_y = y;
+  params.crop_width = size[0];
+  params.crop_height = size[1];
+}
+
+RenderParams make_params(const Options& options, const Scene& scene) {
+  const std::size_t camera = options.camera.empty() ? 0 : find_camera(scene, options.camera, "--camera");
+  RenderParams params = default_render_params(scene, camera);
+  if (!options.size.empty()) {
+    const auto size = parse_size(options.size, "--size");
+    params.width = params.crop_width = size[0];
+    params.height = params.crop_height = size[1];
+  }
+  if (!options.crop.empty()) parse_crop(options.crop, params);
+  if (std::int64_t{params.crop_width} * params.crop_height > (std::int64_t{1} << 28))
+    throw UsageError("the picture has more than 2^28 pixels; render it in parts with --crop");
+  if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
+  params.method = options.method == "exact" ? Method::kExact : Method::kHierarchical;
+  params.tolerance = options.tolerance;
+  params.seed = options.common.seed;
+  params.aovs = parse_aovs(options.aovs);
+  return params;
+}
+
+Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows, Report& report) {
+  const StageTimer timer(report, "read_cache");
+  Cache cache = load_cache(path);
+  const auto bounces = fingerprint_bounces(cache.fingerprint, scene.media.size());
+  const std::string mismatch =
+      describe_mismatch(cache.fingerprint, make_fingerprint(scene, bounces, shadows));
+  if (!mismatch.empty() || cache.groups.size() != scene.media.size())
+    fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
+         mismatch.empty() ? "the number of translucent groups differs" : mismatch);
+  return cache;
+}
+
+// Says where a material is too fine-grained for the cache, and what would serve.
+Warnings check_density(const Scene& scene, const Cache& cache) {
+  Warnings warnings;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    const CacheGroup& group = cache.groups[m];
+    const double spacing =
+        hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * medium.scale;
+    const double length = smallest_mean_free_path(medium);
+    const double blotch = predict_blotch(spacing / length);
+    if (blotch > kAcceptableBlotch)
+      warnings.push_back(
+          fmt::format("{}: the samples of medium {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
+                      "blotches of {:.1f} %; --spacing {:.3g} would serve",
+                      medium.place, medium_name(scene, m), spacing, spacing / length, 100 * blotch,
+                      kDefaultSpacing * length));
+  }
+  return warnings;
+}
+
+std::optional<double> parse_exposure(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) <= 100))
+    throw UsageError("--exposure " + text + ": give a number of stops between -100 and 100, or auto");
+  return value;
+}
+
+void run(const Options& options, const std::string& command_line) {
+  if (!options.cache.empty() && options.bake.any_but_shadows())
+    throw UsageError(
+        "--points, --spacing, --irradiance-samples and --bounces are for baking; --cache is baked already");
+  const std::optional<double> exposure = parse_exposure(options.exposure);
+  const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
+  Session session(options.common, command_line);
+  check_writable(options.output);
+  if (options.png) check_writable(preview);
+
+  const Scene scene = load_scene(options.scene, session);
+  const RenderParams params = make_params(options, scene);
+  const BakeParams bake_params = options.bake.params(options.common);
+  if (options.cache.empty() && !scene.media.empty()) plan_bake(scene, bake_params);
+  const World world = [&] {
+    const StageTimer timer(session.report(), "build_bvh");
+    return make_world(scene, bake_params.shadows);
+  }();
+  const Cache cache = scene.media.empty() ? Cache{}
+                      : options.cache.empty()
+                          ? run_bake(world, bake_params, session)
+                          : load_matching_cache(options.cache, scene, bake_params.shadows, session.report());
+  session.warn(check_density(scene, cache));
+
+  Image image = render(world, cache, params, session.progress(), session.report());
+  image.metadata = {{"nacre:version", kVersion},
+                    {"nacre:command", command_line},
+                    {"nacre:seed", fmt::format("{}", options.common.seed)},
+                    {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
+  {
+    const StageTimer timer(session.report(), "write_image");
+    save_exr(image, options.output);
+    if (options.png) save_png(image, preview, exposure ? *exposure : auto_exposure(image));
+  }
+  session.progress().say(options.png ? options.output + " and " + preview : options.output);
+  session.finish();
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, const std::string& command_line) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("render", "Render a scene to an OpenEXR picture");
+  add_scene_options(*command, options->scene);
+  command->add_option("-o,--output", options->output, "OpenEXR file to write")->required();
+  command->add_option("--cache", options->cache, "Cache that `nacre bake` made (default: bake in memory)");
+  command->add_option("--camera", options->camera, "Id of the camera (default: the first)");
+  command->add_option("--size", options->size, "WIDTHxHEIGHT of the picture (default: the film's)");
+  command->add_option("--crop", options->crop, "X,Y,WIDTHxHEIGHT: render this part of the picture only");
+  command->add_option("--spp", options->samples_per_pixel, "Samples per pixel (default: the sampler's)")
+      ->check(CLI::Range(1, 1 << 16));
+  command->add_option("--method", options->method, "How diffusion is summed: hierarchical (default) or exact")
+      ->check(CLI::IsMember({"hierarchical", "exact"}));
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   "Relative error of the hierarchical sum (default: 0.01)")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--aov", options->aovs,
+                      "none, all (default), or a list of layers, position, normal, depth, object");
+  command->add_flag("--png", options->png, "Write an sRGB preview beside the OpenEXR file");
+  command->add_option("--exposure", options->exposure, "Of the preview, in stops, or auto (default: 0)");
+  add_bake_options(*command, options->bake);
+  add_common_options(*command, options->common);
+  command->callback([options, command_line] { run(*options, command_line); });
+}
+
+}  // namespace nacre::tools
