@@ -15,12 +15,6 @@
 
 namespace nacre::tools {
 
-class ThreadLimitHolder {
- public:
-  explicit ThreadLimitHolder(int threads) : limit(threads) {}
-  ThreadLimit limit;
-};
-
 namespace {
 
 ProgressStyle progress_style(bool quiet) {
@@ -44,7 +38,7 @@ Defines parse_defines(const std::vector<std::string>& texts) {
 Session::Session(const CommonOptions& options, std::string command)
     : options_(options),
       command_(std::move(command)),
-      limit_(new ThreadLimitHolder(options.threads), [](ThreadLimitHolder* holder) { delete holder; }),
+      limit_(options.threads),
       progress_(progress_style(options.quiet)) {
   if (!options_.report_path.empty()) check_writable(options_.report_path);
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nacre/bake/bake.h"
+#include "nacre/base/parallel.h"
 #include "nacre/base/progress.h"
 #include "nacre/base/report.h"
 #include "nacre/scene/scene.h"
@@ -44,7 +45,7 @@ class Session {
   CommonOptions options_;
   std::string command_;
   Stopwatch watch_;
-  std::unique_ptr<class ThreadLimitHolder, void (*)(class ThreadLimitHolder*)> limit_;
+  ThreadLimit limit_;
   Progress progress_;
   Report report_;
 };
