@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::int32_t kMagic = 20000630;
 constexpr std::int32_t kTiledFlag = 0x200, kLongNamesFlag = 0x400, kDeepFlag = 0x800, kMultiPartFlag = 0x1000;
-// Values in one row of all channels; and in one row of tiles, which OpenEXR holds in memory as a whole.
-constexpr std::int64_t kMaxRowValues = std::int64_t{1} << 26, kMaxTileRowValues = std::int64_t{1} << 28;
+// Values in the chunks that OpenEXR decodes at once: a group of lines, or a row of tiles.
+constexpr std::int64_t kMaxChunkValues = std::int64_t{1} << 26;
 constexpr std::int64_t kMaxChannels = 1024;
 constexpr std::int64_t kFarthest = 1 << 29;
 
@@ -154,19 +154,17 @@ void check_exr_header(std::string_view head, std::uint64_t file_bytes, const std
   if (!layout.data || !layout.display || !layout.channels || !layout.compression)
     cursor.fail_damaged("one of channels, compression, dataWindow, displayWindow is missing");
   const auto [width, height] = *layout.data;
-  if (width * height > kMaxImagePixels || width * *layout.channels > kMaxRowValues)
-    fail(ErrorCode::kLimit, path, "{} x {} pixels with {} channels are more than nacre reads", width, height,
-         *layout.channels);
-  std::int64_t chunks = divide_up(height, lines_per_chunk(*layout.compression, cursor));
-  if ((version & kTiledFlag) != 0) {
-    if (!layout.tile || (*layout.tile)[0] <= 0 || (*layout.tile)[1] <= 0)
-      cursor.fail_damaged("the file is tiled and its tiles have no size");
-    const auto [tile_width, tile_height] = *layout.tile;
-    if (std::max(width, tile_width) > kMaxTileRowValues / tile_height / *layout.channels)
-      fail(ErrorCode::kLimit, path, "tiles of {} x {} pixels are larger than nacre reads", tile_width,
-           tile_height);
-    chunks = divide_up(width, tile_width) * divide_up(height, tile_height);
-  }
+  const bool tiled = (version & kTiledFlag) != 0;
+  if (tiled && (!layout.tile || (*layout.tile)[0] <= 0 || (*layout.tile)[1] <= 0))
+    cursor.fail_damaged("the file is tiled and its tiles have no size");
+  const std::int64_t chunk_width = tiled ? (*layout.tile)[0] : width;
+  const std::int64_t chunk_height = tiled ? (*layout.tile)[1] : lines_per_chunk(*layout.compression, cursor);
+  if (width * height > kMaxImagePixels ||
+      std::max(width, chunk_width) > kMaxChunkValues / *layout.channels / chunk_height)
+    fail(ErrorCode::kLimit, path,
+         "{} x {} pixels with {} channels in chunks of {} x {} are more than nacre reads", width, height,
+         *layout.channels, chunk_width, chunk_height);
+  const std::int64_t chunks = divide_up(width, chunk_width) * divide_up(height, chunk_height);
   // Every chunk has an entry of eight bytes in the table behind the header.
   if (static_cast<std::uint64_t>(chunks) > file_bytes / 8)
     fail(ErrorCode::kSyntax, path,
