@@ -1,9 +1,14 @@
-# Everything nacre links, found once here and again by an installed nacre's package file.
-find_package(embree 3 CONFIG REQUIRED)
-find_package(OpenMesh CONFIG REQUIRED)
-find_package(OpenEXR 3 CONFIG REQUIRED)
-find_package(Imath 3 CONFIG REQUIRED)
-find_package(TBB CONFIG REQUIRED)
-find_package(fmt REQUIRED)
-find_package(pugixml REQUIRED)
+# Everything nacre is built from. What its static library is linked with is listed once, here, and found again
+# by an installed nacre's package file.
+set(NACRE_LINKED_PACKAGES
+  "embree 3 CONFIG" "OpenMesh CONFIG" "OpenEXR 3 CONFIG" "Imath 3 CONFIG" "TBB CONFIG" "fmt" "pugixml")
+set(NACRE_FIND_DEPENDENCIES "")
+foreach(package IN LISTS NACRE_LINKED_PACKAGES)
+  separate_arguments(arguments UNIX_COMMAND "${package}")
+  find_package(${arguments} REQUIRED)
+  string(APPEND NACRE_FIND_DEPENDENCIES "find_dependency(${package})\n")
+endforeach()
+
+# Headers that no consumer of the library needs.
 find_package(nlohmann_json REQUIRED)
+find_package(CLI11 CONFIG REQUIRED)

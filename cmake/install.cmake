@@ -11,4 +11,4 @@ configure_package_config_file(cmake/nacreConfig.cmake.in ${CMAKE_BINARY_DIR}/nac
                               INSTALL_DESTINATION ${NACRE_PACKAGE_DIR})
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/nacreConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/nacreConfig.cmake ${CMAKE_BINARY_DIR}/nacreConfigVersion.cmake
-              cmake/dependencies.cmake DESTINATION ${NACRE_PACKAGE_DIR})
+        DESTINATION ${NACRE_PACKAGE_DIR})

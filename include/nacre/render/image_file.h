@@ -35,7 +35,7 @@ void save_exr(const Image& image, const std::string& path);
 
 /// Reads all channels of a scanline or tiled single-part OpenEXR as floats, subsampled channels excepted,
 /// with its string attributes. Throws Error: kNotFound, kIo, kSyntax (not an OpenEXR file, or damaged),
-/// kLimit (a window of more than 2^28 pixels).
+/// kUnsupported (deep or multi-part), kLimit (a window of more than 2^28 pixels).
 Image load_exr(const std::string& path);
 
 /// 8-bit sRGB picture of R, G, B times 2^exposure, clipped, the alpha channel ignored (pictures have black
@@ -52,13 +52,13 @@ struct ImageDifference {
       0;  // over pixels whose |b| is above 1e-4 of the channel's largest |b| in the frame
   int largest_x = 0, largest_y = 0;  // where that is, in full-frame pixels
   std::string largest_channel;
-  double psnr = 0;         // dB against the largest |b|; infinite when identical
+  double psnr = 0;         // dB against the channel's largest |b|, the worst channel; infinite when identical
   bool identical = false;  // bit for bit
 };
 /// Compares a with the reference b over the channels of `layer`. Throws Error(kMismatch) when windows differ
 /// or a channel is missing in one of them, naming both.
 ImageDifference compare_images(const Image& a, const Image& b, const std::string& layer);
-/// Names of the layers of an image: "" first if it has R, G, B.
+/// Names of the layers of an image: "" first if it has R, G, B or any other channel without a dot.
 std::vector<std::string> layer_names(const Image& image);
 
 }  // namespace nacre

@@ -1,0 +1,19 @@
+// A look at an OpenEXR header before OpenEXR reads it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace nacre {
+
+/// Longest header that load_exr reads, in bytes.
+inline constexpr std::size_t kMaxExrHeader = std::size_t{4} << 20;
+
+/// OpenEXR allocates what a header asks for before it looks whether the file holds as much; this holds the
+/// header's sizes against the file first. `head` is the file's beginning: kMaxExrHeader bytes or all of it.
+/// Throws Error: kSyntax, kUnsupported (deep or multi-part files, unknown versions), kLimit.
+/// Source: "OpenEXR File Layout" of the OpenEXR project.
+void check_exr_header(std::string_view head, std::uint64_t file_bytes, const std::string& path);
+
+}  // namespace nacre
