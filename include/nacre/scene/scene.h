@@ -92,14 +92,17 @@ struct Film {
   float filter_stddev = 0.5f;
 };
 
+/// What Integrator::bounces() returns for a path without limit.
+inline constexpr int kUnlimitedBounces = 1'000'000;
+
 enum class IntegratorKind { kDirect, kPath };
 struct Integrator {
   IntegratorKind kind = IntegratorKind::kDirect;
   int emitter_samples = 1;  // connections to each area light from every shaded point
   int max_depth = -1;       // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen
                             // directly, 2 direct light
-  /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) for
-  /// path.
+  /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) or
+  /// kUnlimitedBounces for path.
   int bounces() const;
 };
 

@@ -1,0 +1,40 @@
+// Readers of the elements of a scene, one kind of plugin each.
+#pragma once
+
+#include <string>
+
+#include "nacre/scene/scene.h"
+#include "scene/scene_xml.h"
+
+namespace nacre {
+
+/// Limit of world space, in scene units: squares of distances stay finite in single precision.
+inline constexpr double kMaxCoordinate = 1e15;
+
+struct MediumElement {
+  Medium medium;
+  SubsurfaceSettings settings;
+};
+
+struct SensorElement {
+  Camera camera;
+  Film film;
+  int samples_per_pixel = 0;  // 0: the sensor does not say
+};
+
+/// <bsdf>
+Surface read_surface(const XmlElement& element, Warnings& warnings);
+/// <subsurface>
+MediumElement read_medium(const XmlElement& element, Warnings& warnings);
+/// <emitter> directly inside <scene>: point or directional.
+Light read_light(const XmlElement& element, Warnings& warnings);
+/// <emitter> inside a shape, of type area: its radiance.
+Rgb read_area_radiance(const XmlElement& element, Warnings& warnings);
+/// <sensor> with its film and sampler
+SensorElement read_sensor(const XmlElement& element, Warnings& warnings);
+/// <integrator>
+Integrator read_integrator(const XmlElement& element, Warnings& warnings);
+/// The mesh of a <shape> in world space: type, file and transforms, not what stands inside it.
+Mesh read_mesh(const XmlElement& element, Warnings& warnings);
+
+}  // namespace nacre

@@ -1,0 +1,93 @@
+// <subsurface type="dipole">: coefficients, presets, indices of refraction.
+#include "scene/elements.h"
+#include "scene/parameters.h"
+
+namespace nacre {
+namespace {
+
+constexpr Range kCoefficient{0, 1e6};  // 1/mm: no material has a mean free path below a nanometre
+constexpr Range kCosine{-1, 1, true};
+
+// Coefficients come from a preset, from sigmaS and sigmaA, or from sigmaT and albedo: one of the three.
+Medium read_coefficients(Parameters& parameters) {
+  const bool separate = parameters.has("sigmaS") || parameters.has("sigmaA");
+  const bool total = parameters.has("sigmaT") || parameters.has("albedo");
+  const bool preset = parameters.has("material");
+  if (separate + total + preset > 1)
+    fail(ErrorCode::kValue, parameters.plugin().place(),
+         "give either material, or sigmaS and sigmaA, or sigmaT and albedo, not more than one of them");
+  const auto need = [&](const char* a, const char* b) {
+    if (!parameters.has(a) || !parameters.has(b))
+      fail(ErrorCode::kValue, parameters.plugin().place(), "{} and {} are needed together, {} is missing", a,
+           b, parameters.has(a) ? b : a);
+  };
+
+  Medium medium;
+  if (separate) {
+    need("sigmaS", "sigmaA");
+    medium.sigma_s = parameters.color("sigmaS", {}, kCoefficient);
+    medium.sigma_a = parameters.color("sigmaA", {}, kCoefficient);
+  } else if (total) {
+    need("sigmaT", "albedo");
+    const Rgb sigma_t = parameters.color("sigmaT", {}, kCoefficient);
+    const Rgb albedo = parameters.color("albedo", {}, kFraction);
+    medium.sigma_s = sigma_t * albedo;
+    medium.sigma_a = sigma_t * (Rgb(1, 1, 1) - albedo);
+  } else {
+    const std::string name = parameters.string("material", "Skin1");
+    const Preset* row = find_preset(name);
+    if (!row)
+      fail(ErrorCode::kValue, parameters.place("material"),
+           "there is no material '{}'; near it: {} (`nacre materials` lists all)", name,
+           suggest_presets(name));
+    medium = make_medium(*row);
+  }
+
+  const Rgb g = parameters.color("g", medium.g, kCosine);
+  // Presets are measured as sigma_s', which another g leaves as it is.
+  if (!separate && !total) medium.sigma_s = medium.sigma_s * (Rgb(1, 1, 1) - medium.g) / (Rgb(1, 1, 1) - g);
+  medium.g = g;
+  if (max_channel(medium.sigma_s + medium.sigma_a) == 0)
+    fail(ErrorCode::kValue, parameters.plugin().place(), "the medium neither scatters nor absorbs");
+  return medium;
+}
+
+}  // namespace
+
+MediumElement read_medium(const XmlElement& element, Warnings& warnings) {
+  if (plugin_type(element) != "dipole") fail_unknown_type(element, "dipole");
+  Parameters parameters(element, warnings);
+  MediumElement result;
+  Medium& medium = result.medium;
+  medium = read_coefficients(parameters);
+  medium.id = element.get("id");
+  medium.place = element.place();
+  const bool has_scale = parameters.has("scale");
+  medium.scale = parameters.number("scale", 1, {0, 1e9, true});
+  if (!medium.material.empty() && !has_scale)
+    warnings.push_back(
+        fmt::format("{}: material '{}' is in 1/mm and there is no scale: one scene unit is taken as 1 mm",
+                    parameters.place("material"), medium.material));
+  const bool has_ior = parameters.has("intIOR") || parameters.has("extIOR");
+  if (has_ior || medium.material.empty()) {
+    medium.int_ior = parameters.ior("intIOR", "bk7");
+    medium.ext_ior = parameters.ior("extIOR", "air");
+  }
+  medium.profile =
+      static_cast<ProfileKind>(parameters.choice("profile", {"dipole", "betterdipole", "normalized"}));
+  medium.convention = static_cast<Convention>(parameters.choice("convention", {"published", "conserving"}));
+
+  SubsurfaceSettings& settings = result.settings;
+  settings.irradiance_samples = parameters.integer("irrSamples", 0, 0, 1'000'000);
+  settings.indirect = parameters.boolean("irrIndirect", true);
+  settings.sample_multiplier = parameters.number("sampleMultiplier", 1, {0, 1e6, true});
+  if (parameters.has("quality")) {
+    parameters.number("quality", 0, kPositive);
+    warnings.push_back(
+        fmt::format("{}: quality has no effect, --tolerance sets the accuracy", parameters.place("quality")));
+  }
+  parameters.finish();
+  return result;
+}
+
+}  // namespace nacre

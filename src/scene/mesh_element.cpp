@@ -1,0 +1,95 @@
+// <shape>: mesh files and built-in shapes, brought into world space with the normals that were asked for.
+#include <algorithm>
+
+#include "nacre/geometry/mesh_file.h"
+#include "nacre/geometry/primitives.h"
+#include "nacre/geometry/subdivide.h"
+#include "scene/elements.h"
+#include "scene/parameters.h"
+#include "scene/values.h"
+
+namespace nacre {
+namespace {
+
+Mesh load_mesh_of_type(Parameters& parameters, const std::string& type, Warnings& warnings) {
+  const std::string name = parameters.string("filename", "");
+  const std::string place = parameters.place("filename");
+  if (name.empty())
+    fail(ErrorCode::kSyntax, place, "{} needs <string name=\"filename\" value=\"...\"/>", parameters.name());
+  if (!to_lower(name).ends_with("." + type))
+    fail(ErrorCode::kValue, place, "'{}' is not a .{} file: {} reads no other", name, type,
+         parameters.name());
+  try {
+    return load_mesh(resolve_path(name, parameters.plugin().file), warnings);
+  } catch (const Error& error) {
+    throw Error(error.code(), place, error.what());
+  }
+}
+
+// In the shape's own space; file meshes without normals get them later, in world space.
+Mesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
+  const auto to_float = [](const Vec3d& v) {
+    return Vec3(static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z));
+  };
+  if (type == "obj" || type == "ply" || type == "stl" || type == "off")
+    return load_mesh_of_type(parameters, type, warnings);
+  if (type == "rectangle") return make_rectangle();
+  if (type == "cube") return make_cube();
+  if (type == "disk") return make_disk();
+  if (type == "cylinder") {
+    const Vec3d p0 = parameters.triple("p0", {0, 0, 0}), p1 = parameters.triple("p1", {0, 0, 1});
+    const float radius = parameters.number("radius", 1, kPositive);
+    return make_cylinder(to_float(p0), to_float(p1), radius, parameters.plugin().place());
+  }
+  if (type == "sphere") {
+    const Vec3d center = parameters.triple("center", {0, 0, 0});
+    const double radius = parameters.number("radius", 1, kPositive);
+    Mesh mesh = make_sphere();
+    Matrix4 placement;
+    placement.setScale(radius);
+    placement[3][0] = center.x;
+    placement[3][1] = center.y;
+    placement[3][2] = center.z;
+    transform_mesh(mesh, placement, parameters.plugin().place());
+    return mesh;
+  }
+  fail_unknown_type(parameters.plugin(), "obj, ply, stl, off, sphere, rectangle, cube, disk, cylinder");
+}
+
+void check_extent(const Mesh& mesh, const std::string& place) {
+  for (const Vec3& p : mesh.positions)
+    for (int k = 0; k < 3; ++k)
+      if (!(std::abs(p[k]) < kMaxCoordinate))
+        fail(ErrorCode::kValue, place, "the shape reaches out to {:g} in world space", p[k]);
+  if (!(surface_area(mesh) > 0)) fail(ErrorCode::kValue, place, "the shape has no area in world space");
+}
+
+}  // namespace
+
+Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
+  Parameters parameters(element, warnings);
+  Mesh mesh = make_mesh(parameters, plugin_type(element), warnings);
+  const Matrix4 to_world = parameters.transform("toWorld");
+  const bool flip = parameters.boolean("flipNormals", false);
+  const bool face_normals = parameters.boolean("faceNormals", false);
+  const bool has_angle = parameters.has("maxSmoothAngle");
+  const float angle = parameters.number("maxSmoothAngle", 180, {0, 180});
+  const int levels = parameters.integer("subdivisions", 0, 0, 6);
+  if (face_normals && has_angle)
+    fail(ErrorCode::kValue, parameters.place("maxSmoothAngle"),
+         "give either faceNormals or maxSmoothAngle, not both");
+  parameters.finish({"bsdf", "subsurface", "emitter", "ref"}, {"flipTexCoords", "srgb", "collapse"});
+
+  if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
+  transform_mesh(mesh, to_world, parameters.place("toWorld"));
+  check_extent(mesh, element.place());
+  if (flip) flip_normals(mesh);
+  if (face_normals) {
+    mesh.normals.clear();
+  } else if (has_angle || mesh.normals.empty()) {
+    compute_normals(mesh, angle);
+  }
+  return mesh;
+}
+
+}  // namespace nacre

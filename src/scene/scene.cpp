@@ -1,0 +1,30 @@
+// Names and look-ups in a scene.
+#include "nacre/scene/scene.h"
+
+namespace nacre {
+
+int Integrator::bounces() const {
+  if (kind == IntegratorKind::kDirect) return 1;
+  return max_depth < 0 ? kUnlimitedBounces : std::max(0, max_depth - 2);
+}
+
+std::string light_name(const Scene& scene, std::size_t light) {
+  const std::string& id = scene.lights[light].id;
+  return id.empty() ? fmt::format("light {}", light + 1) : id;
+}
+
+std::string medium_name(const Scene& scene, std::size_t medium) {
+  const std::string& id = scene.media[medium].id;
+  return id.empty() ? fmt::format("medium {}", medium + 1) : id;
+}
+
+std::size_t find_camera(const Scene& scene, const std::string& id, const std::string& place) {
+  std::string known;
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    if (scene.cameras[i].id == id) return i;
+    known += (i ? ", '" : "'") + scene.cameras[i].id + "'";
+  }
+  fail(ErrorCode::kValue, place, "no camera has the id '{}'; there is {}", id, known);
+}
+
+}  // namespace nacre

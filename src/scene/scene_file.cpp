@@ -1,0 +1,218 @@
+// Builds a scene from the elements of its file: order, ids and references, and what is worth a warning.
+#include "nacre/scene/scene_file.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "nacre/geometry/topology.h"
+#include "scene/elements.h"
+#include "scene/framing.h"
+#include "scene/parameters.h"
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t kMaxTriangles = 200'000'000;  // of all shapes together
+constexpr float kDefaultFov = 35;
+
+class Builder {
+ public:
+  Builder(Scene& scene, const XmlElement& root) : scene_(scene), root_(root) { collect_ids(root); }
+  void build();
+
+ private:
+  void collect_ids(const XmlElement& element);
+  void add_element(const XmlElement& element);
+  void add_sensor(const XmlElement& element);
+  void add_shape(const XmlElement& element);
+  void add_default_camera();
+  int surface_index(const XmlElement& element);
+  int medium_index(const XmlElement& element);
+  int add_default_surface(const Shape& shape);
+  const XmlElement& resolve(const XmlElement& ref) const;
+  void warn_about_shape(const Shape& shape);
+  void warn(const std::string& place, const std::string& text) {
+    scene_.warnings.push_back(place + ": " + text);
+  }
+
+  Scene& scene_;
+  const XmlElement& root_;
+  std::map<std::string, const XmlElement*> ids_;
+  std::map<const XmlElement*, int> surfaces_, media_;  // those that are in the scene already
+  std::size_t triangles_ = 0;
+  bool has_integrator_ = false, has_sample_count_ = false;
+};
+
+void Builder::collect_ids(const XmlElement& element) {
+  if (element.tag != "ref" && element.has("id")) {
+    const auto [first, is_new] = ids_.emplace(element.get("id"), &element);
+    if (!is_new)
+      fail(ErrorCode::kValue, element.place(), "the id '{}' is taken already by the <{}> at {}",
+           element.get("id"), first->second->tag, first->second->place());
+  }
+  for (const XmlElement& child : element.children) collect_ids(child);
+}
+
+const XmlElement& Builder::resolve(const XmlElement& ref) const {
+  const auto found = ids_.find(ref.get("id"));
+  if (found == ids_.end()) fail(ErrorCode::kValue, ref.place(), "no element has the id '{}'", ref.get("id"));
+  return *found->second;
+}
+
+void Builder::build() {
+  for (const XmlElement& element : root_.children) add_element(element);
+  Parameters(root_, scene_.warnings)
+      .finish({"integrator", "sensor", "emitter", "shape", "bsdf", "subsurface"});
+
+  if (scene_.shapes.empty()) fail(ErrorCode::kValue, scene_.path, "the scene has no <shape>");
+  // Surfaces and media enter the scene with the first shape that uses them; the others are only checked.
+  for (const XmlElement& element : root_.children) {
+    if (element.tag == "bsdf" && !surfaces_.contains(&element)) read_surface(element, scene_.warnings);
+    if (element.tag == "subsurface" && !media_.contains(&element)) {
+      read_medium(element, scene_.warnings);
+      warn(element.place(), fmt::format("no shape uses the subsurface '{}'", element.get("id")));
+    }
+  }
+  if (scene_.lights.empty()) warn(scene_.path, "the scene has no <emitter>: pictures will be black");
+  if (scene_.cameras.empty()) add_default_camera();
+}
+
+void Builder::add_element(const XmlElement& element) {
+  if (element.tag == "shape") {
+    add_shape(element);
+  } else if (element.tag == "emitter") {
+    scene_.lights.push_back(read_light(element, scene_.warnings));
+  } else if (element.tag == "sensor") {
+    add_sensor(element);
+  } else if (element.tag == "integrator") {
+    if (has_integrator_) fail(ErrorCode::kSyntax, element.place(), "a second <integrator>");
+    has_integrator_ = true;
+    scene_.integrator = read_integrator(element, scene_.warnings);
+  }
+}
+
+void Builder::add_sensor(const XmlElement& element) {
+  SensorElement sensor = read_sensor(element, scene_.warnings);
+  if (sensor.camera.id.empty()) sensor.camera.id = fmt::format("camera {}", scene_.cameras.size() + 1);
+  const int count = sensor.samples_per_pixel;
+  if (count > 0 && has_sample_count_ && count != scene_.samples_per_pixel)
+    warn(element.place(), fmt::format("sampleCount {} is ignored, the first sensor's {} is used for all",
+                                      count, scene_.samples_per_pixel));
+  if (count > 0 && !has_sample_count_) {
+    scene_.samples_per_pixel = count;
+    has_sample_count_ = true;
+  }
+  scene_.cameras.push_back(std::move(sensor.camera));
+  scene_.films.push_back(sensor.film);
+}
+
+int Builder::surface_index(const XmlElement& element) {
+  const auto [found, is_new] = surfaces_.emplace(&element, static_cast<int>(scene_.surfaces.size()));
+  if (is_new) scene_.surfaces.push_back(read_surface(element, scene_.warnings));
+  return found->second;
+}
+
+int Builder::medium_index(const XmlElement& element) {
+  const auto [found, is_new] = media_.emplace(&element, static_cast<int>(scene_.media.size()));
+  if (is_new) {
+    MediumElement read = read_medium(element, scene_.warnings);
+    scene_.media.push_back(std::move(read.medium));
+    scene_.subsurface.push_back(read.settings);
+  }
+  return found->second;
+}
+
+// As in Mitsuba: what emits and has no bsdf reflects nothing, everything else is half grey.
+int Builder::add_default_surface(const Shape& shape) {
+  const float reflectance = shape.light == kNone ? 0.5f : 0.0f;
+  scene_.surfaces.push_back({"", shape.place, DiffuseSurface{Rgb(reflectance)}});
+  return static_cast<int>(scene_.surfaces.size()) - 1;
+}
+
+void Builder::add_shape(const XmlElement& element) {
+  const std::size_t index = scene_.shapes.size();
+  Shape shape;
+  shape.id = element.has("id") ? element.get("id") : fmt::format("shape {}", index + 1);
+  shape.type = plugin_type(element);
+  shape.place = element.place();
+
+  std::optional<Light> light;
+  for (const XmlElement& child : element.children) {
+    const XmlElement& target = child.tag == "ref" ? resolve(child) : child;
+    const auto set_once = [&](bool is_set) {
+      if (is_set) fail(ErrorCode::kSyntax, child.place(), "a second <{}> in one shape", target.tag);
+    };
+    if (target.tag == "bsdf") {
+      set_once(shape.surface != kNone);
+      shape.surface = surface_index(target);
+    } else if (target.tag == "subsurface") {
+      set_once(shape.medium != kNone);
+      shape.medium = medium_index(target);
+    } else if (target.tag == "emitter" && &target == &child) {
+      set_once(light.has_value());
+      light = Light{child.has("id") ? child.get("id") : element.get("id"), child.place(),
+                    AreaLight{static_cast<std::uint32_t>(index), read_area_radiance(child, scene_.warnings)}};
+    } else if (child.tag == "ref") {
+      fail(ErrorCode::kUnsupported, child.place(),
+           "'{}' is {} <{}>; a shape can refer to a <bsdf> or a <subsurface>", child.get("id"),
+           target.tag.starts_with('e') || target.tag.starts_with('i') ? "an" : "a", target.tag);
+    }
+  }
+  shape.mesh = read_mesh(element, scene_.warnings);
+  triangles_ += shape.mesh.triangles.size();
+  if (triangles_ > kMaxTriangles)
+    fail(ErrorCode::kLimit, element.place(), "up to here the scene has {} triangles, more than {}",
+         triangles_, kMaxTriangles);
+
+  if (light) {
+    shape.light = static_cast<int>(scene_.lights.size());
+    scene_.lights.push_back(std::move(*light));
+  }
+  if (shape.surface == kNone && shape.medium == kNone) shape.surface = add_default_surface(shape);
+  if (shape.medium != kNone) warn_about_shape(shape);
+  scene_.shapes.push_back(std::move(shape));
+}
+
+void Builder::warn_about_shape(const Shape& shape) {
+  const std::string problems = describe_problems(analyse_topology(shape.mesh));
+  if (!problems.empty()) warn(shape.place, fmt::format("{} is translucent, but {}", shape.id, problems));
+  if (shape.surface == kNone) return;
+  const auto* boundary =
+      std::get_if<DielectricSurface>(&scene_.surfaces[static_cast<std::size_t>(shape.surface)].model);
+  const float eta = scene_.media[static_cast<std::size_t>(shape.medium)].eta();
+  if (boundary && std::abs(boundary->int_ior / boundary->ext_ior - eta) > 1e-3f)
+    warn(shape.place, fmt::format("{}: the boundary has the relative index {:.4g} of the subsurface, the "
+                                  "{:.4g} of the dielectric is ignored",
+                                  shape.id, eta, boundary->int_ior / boundary->ext_ior));
+}
+
+// In front of the translucent shapes, else of those that do not emit.
+void Builder::add_default_camera() {
+  Box3 translucent, opaque, all;
+  for (const Shape& shape : scene_.shapes) {
+    const Box3 box = bounds(shape.mesh);
+    all.extendBy(box);
+    if (shape.medium != kNone) translucent.extendBy(box);
+    if (shape.light == kNone) opaque.extendBy(box);
+  }
+  const Box3& box = !translucent.isEmpty() ? translucent : !opaque.isEmpty() ? opaque : all;
+  const Film film;
+  Camera camera = make_framing_camera(box, {-0.3, -0.25, -1}, kDefaultFov, film);
+  camera.id = "camera 1";
+  camera.place = scene_.path;
+  scene_.cameras.push_back(std::move(camera));
+  scene_.films.push_back(film);
+  warn(scene_.path, "the scene has no <sensor>: a camera is placed in front of it");
+}
+
+}  // namespace
+
+Scene load_scene(const std::string& path, const Defines& defines) {
+  Scene scene;
+  scene.path = path;
+  const XmlElement root = load_scene_xml(path, defines, scene.warnings);
+  Builder(scene, root).build();
+  return scene;
+}
+
+}  // namespace nacre

@@ -1,0 +1,36 @@
+// A scene file as a tree of checked elements: $names replaced, includes spliced in, every element with its
+// line.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "nacre/scene/scene_file.h"
+
+namespace nacre {
+
+struct XmlElement {
+  std::string tag;  // "lookAt" of older files is "lookat" here
+  std::string file;
+  std::size_t line = 0;
+  std::vector<std::pair<std::string, std::string>> attributes;
+  std::vector<XmlElement> children;
+
+  /// "file:line"
+  std::string place() const { return fmt::format("{}:{}", file, line); }
+  bool has(std::string_view attribute) const;
+  /// "" if it is absent.
+  const std::string& get(std::string_view attribute) const;
+};
+
+/// Reads a file and what it includes into one <scene>. Throws Error with "file:line" for what is not XML, an
+/// element or attribute that scenes do not have, a required attribute that is missing, an undefined $name,
+/// and includes that are missing, circular or too many. Warns of a define that no $name uses.
+XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings);
+
+/// `name` as written in a file, relative to the folder of `file`.
+std::string resolve_path(const std::string& name, const std::string& file);
+
+}  // namespace nacre
