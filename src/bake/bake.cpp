@@ -45,18 +45,25 @@ KeyValues make_info(const Scene& scene, const BakePlan& plan, const BakeParams& 
   return info;
 }
 
-SurfaceSamples place_samples(const GroupSurface& surface, double points, std::uint64_t seed,
-                             Progress& progress) {
-  std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
+// Samples without irradiance yet, and the size of the triangle that each lies on.
+struct PlacedSamples {
   SurfaceSamples samples;
-  samples.areas = compute_area_shares(surface, placed, progress);
-  samples.positions.reserve(placed.size());
-  samples.normals.reserve(placed.size());
+  std::vector<float> extents;
+};
+
+PlacedSamples place_samples(const GroupSurface& surface, double points, std::uint64_t seed,
+                            Progress& progress) {
+  const std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
+  PlacedSamples result;
+  result.samples.areas = compute_area_shares(surface, placed, progress);
+  for (auto* vectors : {&result.samples.positions, &result.samples.normals}) vectors->reserve(placed.size());
+  result.extents.reserve(placed.size());
   for (const PlacedPoint& point : placed) {
-    samples.positions.push_back(point.position);
-    samples.normals.push_back(point.normal);
+    result.samples.positions.push_back(point.position);
+    result.samples.normals.push_back(point.normal);
+    result.extents.push_back(surface.extent(point.triangle));
   }
-  return samples;
+  return result;
 }
 
 }  // namespace
@@ -114,22 +121,22 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
   std::vector<int> bounces;
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
     const GroupPlan& group = plan.groups[m];
-    SurfaceSamples samples;
+    PlacedSamples placed;
     double area = 0;
     {
       const StageTimer timer(report, "place_samples");
       const GroupSurface surface = make_group_surface(group_meshes(scene, m));
       area = surface.areas.total();
-      samples = place_samples(surface, group.points, hash_words(params.seed, m, 0), progress);
+      placed = place_samples(surface, group.points, hash_words(params.seed, m, 0), progress);
     }
     {
       const StageTimer timer(report, "irradiance");
-      samples.irradiance = compute_irradiance(world, samples.positions, samples.normals, scene.media[m].eta(),
-                                              group.irradiance_samples, group.bounces,
-                                              hash_words(params.seed, m, 1), progress);
+      placed.samples.irradiance = compute_irradiance(
+          world, {placed.samples.positions, placed.samples.normals, placed.extents}, scene.media[m].eta(),
+          group.irradiance_samples, group.bounces, hash_words(params.seed, m, 1), progress);
     }
     const StageTimer timer(report, "build_octree");
-    cache.groups.push_back(build_group(group.name, area, samples, storage));
+    cache.groups.push_back(build_group(group.name, area, placed.samples, storage));
     bounces.push_back(group.bounces);
     report.counts["points"] += cache.groups.back().size();
     report.counts["octree_nodes"] += cache.groups.back().nodes.size();

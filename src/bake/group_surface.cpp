@@ -45,6 +45,12 @@ Vec3 GroupSurface::normal(std::size_t triangle) const {
   return cross(positions[t[1]] - positions[t[0]], positions[t[2]] - positions[t[0]]).normalized();
 }
 
+float GroupSurface::extent(std::size_t triangle) const {
+  const Triangle& t = triangles[triangle];
+  const Vec3 &a = positions[t[0]], &b = positions[t[1]], &c = positions[t[2]];
+  return std::sqrt(std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()}));
+}
+
 GroupSurface make_group_surface(std::span<const Mesh* const> meshes) {
   GroupSurface surface;
   Mesh joined;  // positions alone, for welding

@@ -31,7 +31,8 @@ struct GroupSurface {
   std::uint32_t component_count = 0;
   std::vector<SheetEdge> sheet_edges;
 
-  Vec3 normal(std::size_t triangle) const;  // unit; zero if degenerate
+  Vec3 normal(std::size_t triangle) const;   // unit; zero if degenerate
+  float extent(std::size_t triangle) const;  // longest edge
 };
 
 GroupSurface make_group_surface(std::span<const Mesh* const> meshes);

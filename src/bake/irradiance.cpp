@@ -9,7 +9,7 @@ namespace nacre {
 namespace {
 
 struct Receiver {
-  Vec3 position, normal;
+  Vec3 position, normal, origin;  // origin: just off the surface
   float eta;
 };
 
@@ -22,8 +22,7 @@ Rgb direct_irradiance(const World& world, const Receiver& at, int samples, std::
       const Vec2 u = sobol_2d(static_cast<std::uint32_t>(s), hash_words(key, light));
       const LightSample sample = sample_light(world, light, at.position, u);
       const float cosine = dot(sample.direction, at.normal);
-      if (cosine <= 0 || is_black(sample.irradiance) || !is_visible(world, at.position, at.normal, sample))
-        continue;
+      if (cosine <= 0 || is_black(sample.irradiance) || !is_visible(world, at.origin, sample)) continue;
       of_light += sample.irradiance * (cosine * (1 - fresnel_reflectance(cosine, at.eta)));
     }
     sum += of_light / static_cast<float>(count);
@@ -33,12 +32,11 @@ Rgb direct_irradiance(const World& world, const Receiver& at, int samples, std::
 
 Rgb bounced_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key) {
   const Frame frame = make_frame(at.normal);
-  const Vec3 origin = offset_from_surface(at.position, at.normal);
   Rgb sum(0, 0, 0);
   for (int s = 0; s < samples; ++s) {
     const Vec3 local = sample_cosine_hemisphere(sobol_2d(static_cast<std::uint32_t>(s), key));
     if (local.z <= 0) continue;
-    const Rgb radiance = trace_bounced_light(world, {origin, frame.to_world(local)}, bounces,
+    const Rgb radiance = trace_bounced_light(world, {at.origin, frame.to_world(local)}, bounces,
                                              hash_words(key, static_cast<std::uint64_t>(s), 1));
     sum += radiance * (kPi * (1 - fresnel_reflectance(local.z, at.eta)));
   }
@@ -47,14 +45,15 @@ Rgb bounced_irradiance(const World& world, const Receiver& at, int samples, int 
 
 }  // namespace
 
-std::vector<Rgb> compute_irradiance(const World& world, std::span<const Vec3> positions,
-                                    std::span<const Vec3> normals, float eta, int samples, int bounces,
-                                    std::uint64_t seed, Progress& progress) {
-  std::vector<Rgb> irradiance(positions.size());
-  progress.begin("computing irradiance", "samples", positions.size());
-  parallel_for(positions.size(), 256, [&](std::size_t begin, std::size_t end) {
+std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
+                                    int bounces, std::uint64_t seed, Progress& progress) {
+  std::vector<Rgb> irradiance(points.positions.size());
+  progress.begin("computing irradiance", "samples", points.positions.size());
+  parallel_for(points.positions.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Receiver at{positions[i], normals[i], eta};
+      const Vec3& normal = points.normals[i];
+      const Receiver at{points.positions[i], normal,
+                        offset_from_surface(points.positions[i], normal, points.extents[i]), eta};
       irradiance[i] = direct_irradiance(world, at, samples, hash_words(seed, i, 0));
       if (bounces > 0)
         irradiance[i] += bounced_irradiance(world, at, samples, bounces, hash_words(seed, i, 1));

@@ -203,8 +203,7 @@ class PixelLoop {
       Vec3 transmitted;
       if (!refract(out, point.shading_normal * side, eta, transmitted)) return;
       child.throughput *= bsdf.specular_transmittance;
-      child.ray = {offset_from_surface(point.position, point.geometric_normal * -side),
-                   transmitted.normalized()};
+      child.ray = {point.origin(-side), transmitted.normalized()};
     } else {
       child.throughput *= bsdf.specular_reflectance * (bsdf.transmits ? 1.0f : reflectance);
       Vec3 direction = reflect(out, point.shading_normal * side).normalized();
@@ -212,7 +211,7 @@ class PixelLoop {
       const float below = dot(direction, point.geometric_normal) * side;
       if (below <= 0)
         direction = (direction - point.geometric_normal * (side * (below - 1e-3f))).normalized();
-      child.ray = {offset_from_surface(point.position, point.geometric_normal * side), direction};
+      child.ray = {point.origin(side), direction};
     }
     if (max_channel(child.throughput) > 1e-4f) next.push_back(child);
   }

@@ -49,9 +49,8 @@ LightSample sample_light(const World& world, std::size_t light, const Vec3& x, c
       world.scene->lights[light].model);
 }
 
-bool is_visible(const World& world, const Vec3& x, const Vec3& normal, const LightSample& sample) noexcept {
+bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
   if (!world.shadows) return true;
-  const Vec3 origin = offset_from_surface(x, normal);
   // Short of the light by more than rounding, so that its own surface does not count.
   const float reach = std::isinf(sample.distance) ? sample.distance : sample.distance * (1 - 1e-4f);
   return !world.tracer.occluded({origin, sample.direction, 0, reach});
@@ -62,6 +61,7 @@ Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoin
   Rgb sum(0, 0, 0);
   const float cos_o = dot(point.shading_normal, out);
   if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) return sum;
+  const Vec3 origin = point.origin(1);
   for (std::size_t light = 0; light < world.scene->lights.size(); ++light) {
     const bool sampled = std::holds_alternative<AreaLight>(world.scene->lights[light].model);
     const int count = sampled ? samples : 1;
@@ -72,7 +72,7 @@ Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoin
       const float cos_i = dot(point.shading_normal, sample.direction);
       if (is_black(sample.irradiance) || cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0)
         continue;
-      if (is_visible(world, point.position, point.geometric_normal, sample))
+      if (is_visible(world, origin, sample))
         of_light += eval_diffuse(bsdf, cos_i, cos_o) * sample.irradiance * cos_i;
     }
     sum += of_light / static_cast<float>(count);
@@ -104,7 +104,7 @@ Rgb trace_bounced_light(const World& world, Ray ray, int bounces, std::uint64_t 
       if (rng.next_float() >= survive) break;
       throughput /= survive;
     }
-    ray = {offset_from_surface(point.position, point.geometric_normal), direction};
+    ray = {point.origin(1), direction};
   }
   return sum;
 }

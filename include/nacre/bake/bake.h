@@ -50,11 +50,16 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params);
 Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
            Report& report);
 
-/// Irradiance E_t transmitted into a medium of relative index eta at points on its boundary (unit outward
-/// normals), from every light with `samples` connections to each area light and, with bounces, `samples` rays
-/// for light off opaque surfaces.
-std::vector<Rgb> compute_irradiance(const World& world, std::span<const Vec3> positions,
-                                    std::span<const Vec3> normals, float eta, int samples, int bounces,
-                                    std::uint64_t seed, Progress& progress);
+/// Points on the boundary of a medium: positions, unit outward normals and the triangle_extent of the
+/// triangles they lie on.
+struct ReceiverPoints {
+  std::span<const Vec3> positions, normals;
+  std::span<const float> extents;
+};
+
+/// Irradiance E_t transmitted at points into a medium of relative index eta, from every light with `samples`
+/// connections to each area light and, with bounces, `samples` rays for light off opaque surfaces.
+std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
+                                    int bounces, std::uint64_t seed, Progress& progress);
 
 }  // namespace nacre

@@ -49,15 +49,20 @@ class RayTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The point of a hit from the triangle's own vertices: accurate to a few ulp of their coordinates, unlike
-/// origin + t * direction.
+/// The point of a hit from the triangle's own vertices, in double precision and then rounded: within half an
+/// ulp of the triangle's plane in every coordinate, unlike origin + t * direction.
 Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 
-/// `position` moved off the surface along `normal` by a distance that exceeds the rounding error of
-/// positions, hits and rays at these coordinates, so that a ray from there does not meet the surface it
-/// starts on.
-Vec3 offset_from_surface(const Vec3& position, const Vec3& normal) noexcept;
+/// Length of the longest edge of a triangle.
+float triangle_extent(const Mesh& mesh, std::uint32_t triangle) noexcept;
+
+/// `position` (a hit_position) moved off the surface along the geometric `normal` (unit length; the side on
+/// which the ray is to leave) by a distance that exceeds every rounding error, so that a ray from there does
+/// not meet the surface it starts on. `extent` is the triangle_extent of the triangle that the position lies
+/// on: Embree's error grows with the distance to the vertices, the position's own with its coordinates. The
+/// distance is about 1e-6 of the larger of the two.
+Vec3 offset_from_surface(const Vec3& position, const Vec3& normal, float extent) noexcept;
 
 }  // namespace nacre

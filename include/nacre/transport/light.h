@@ -18,9 +18,9 @@ struct LightSample {
 /// used by the others.
 LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u) noexcept;
 
-/// Whether nothing lies between a point of a surface and a light sample; `normal` is the geometric normal on
-/// the side that the connection leaves from. Always true when the world has no shadows.
-bool is_visible(const World& world, const Vec3& x, const Vec3& normal, const LightSample& sample) noexcept;
+/// Whether nothing lies between `origin`, a point just off a surface (offset_from_surface), and a light
+/// sample taken on that surface. Always true when the world has no shadows.
+bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept;
 
 /// Light that opaque surfaces reflect towards the origin of a ray after one to `bounces` bounces: what the
 /// ray's first opaque hit scatters directly plus, beyond one bounce, what arrives there the same way.

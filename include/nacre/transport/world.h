@@ -28,7 +28,13 @@ World make_world(const Scene& scene, bool shadows);
 struct SurfacePoint {
   Vec3 position;
   Vec3 geometric_normal;  // unit, of the triangle's front side
+  float extent;           // of the triangle, for offset_from_surface
   Vec3 shading_normal;    // unit, interpolated, on the same side as geometric_normal
+
+  /// Where a ray that leaves to the front (side 1) or the back (side -1) starts.
+  Vec3 origin(float side) const noexcept {
+    return offset_from_surface(position, geometric_normal * side, extent);
+  }
 };
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept;
 
