@@ -3,11 +3,14 @@
 set(NACRE_LINKED_PACKAGES
   "embree 3 CONFIG" "OpenMesh CONFIG" "OpenEXR 3 CONFIG" "Imath 3 CONFIG" "TBB CONFIG" "fmt" "pugixml")
 set(NACRE_FIND_DEPENDENCIES "")
+# Debian's Imath reports at length that its Python bindings are not installed.
+set(CMAKE_MESSAGE_LOG_LEVEL NOTICE)
 foreach(package IN LISTS NACRE_LINKED_PACKAGES)
   separate_arguments(arguments UNIX_COMMAND "${package}")
   find_package(${arguments} REQUIRED)
   string(APPEND NACRE_FIND_DEPENDENCIES "find_dependency(${package})\n")
 endforeach()
+unset(CMAKE_MESSAGE_LOG_LEVEL)
 
 # Headers that no consumer of the library needs.
 find_package(nlohmann_json REQUIRED)

@@ -113,10 +113,7 @@ TEST_F(ImageFile, RoundTripKeepsTheCropAndItsPlaceInTheFrame) {
 }
 
 TEST_F(ImageFile, RoundTripOfMoreRowsThanAreDecodedAtOnce) {
-  const Image image =
-      make_image(1024, 1100,
-                 std::vector<std::string>{"a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "c.R", "c.G", "c.B",
-                                          "d.R", "d.G", "d.B", "e.R", "e.G", "e.B", "f.R"});
+  const Image image = make_image(512, 1100, {"a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "c.R", "c.G"});
   save_exr(image, path("large.exr"));
   expect_same_bits(image, load_exr(path("large.exr")));
 }
@@ -227,7 +224,7 @@ TEST_F(ImageFile, MissingAndForeignFilesAreTold) {
 TEST_F(ImageFile, EveryTruncationIsAnError) {
   save_exr(make_image(40, 50, {"R", "G", "B"}), path("a.exr"));
   const std::string whole = read_text_file(path("a.exr"));
-  for (std::size_t length = 0; length < whole.size(); length += length < 700 ? 1 : 97) {
+  for (std::size_t length = 0; length < whole.size(); length += length < 500 ? 3 : 97) {
     write("cut.exr", whole.substr(0, length));
     const Error error = error_of([&] { load_exr(path("cut.exr")); });
     EXPECT_EQ(error.code(), ErrorCode::kSyntax) << length;
@@ -242,8 +239,8 @@ TEST_F(ImageFile, DamagedHeadersNeverCrash) {
   save_exr(image, path("a.exr"));
   const std::string whole = read_text_file(path("a.exr"));
   int refused = 0;
-  for (std::size_t at = 0; at < 700; ++at)
-    for (const int value : {0x00, 0x01, 0x7f, 0x80, 0xff}) {
+  for (std::size_t at = 0; at < 500; ++at)
+    for (const int value : {0x00, 0x7f, 0xff}) {
       std::string bytes = whole;
       bytes[at] = static_cast<char>(value);
       write("damaged.exr", bytes);
@@ -255,7 +252,7 @@ TEST_F(ImageFile, DamagedHeadersNeverCrash) {
         ++refused;
       }
     }
-  EXPECT_GT(refused, 500);
+  EXPECT_GT(refused, 200);
 }
 
 TEST_F(ImageFile, PromisedSizesAreNotBelieved) {

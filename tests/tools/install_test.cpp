@@ -54,9 +54,10 @@ TEST_F(Install, AConsumerBuildsAndRuns) {
 // An installed package that points into its build breaks as soon as that is gone.
 TEST_F(Install, NoInstalledFileNamesTheBuild) {
   run(word(NACRE_CMAKE) + " --install " + word(NACRE_BINARY_DIR) + " --prefix " + word(folder_));
-  EXPECT_EQ(run("grep -rIl -e " + word(NACRE_SOURCE_DIR) + " -e " + word(NACRE_BINARY_DIR) + " " +
-                word(folder_) + " || true"),
-            "");
+  EXPECT_EQ(
+      run("grep -rIlF -e " + word(NACRE_SOURCE_DIR "/include") + " -e " + word(NACRE_SOURCE_DIR "/src") +
+          " -e " + word(NACRE_BINARY_DIR "/") + " " + word(folder_) + " || true"),
+      "");
 }
 
 }  // namespace
