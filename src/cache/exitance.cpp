@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "nacre/base/parallel.h"
+
 namespace nacre {
 namespace {
 
@@ -11,8 +13,11 @@ constexpr int kStackSize = 7 * (kMaxOctreeDepth + 1) + 8;
 
 // The bound holds for the worst arrangement of samples inside a node and adds up errors that mostly cancel;
 // what happens is smaller by more than this factor (measured over the test scenes), which `tolerance`, a
-// relative RMSE, makes use of.
-constexpr double kCalibration = 8;
+// relative RMSE over a picture, makes use of.
+constexpr double kCalibration = 24;
+
+// The first guess opens nodes that are seen under more than this ratio of radius to distance.
+constexpr float kGuessRatio2 = 0.7f * 0.7f;
 
 struct Offset {
   float r2, near2;  // squared distances of the node's centre and of its nearest possible sample
@@ -25,105 +30,125 @@ Offset measure(const OctreeNode& node, const Vec3& x) noexcept {
   return {r2, near > 0 ? near * near : 0.0f};
 }
 
+Float4 load(const float (&channels)[3]) noexcept { return Float4{channels[0], channels[1], channels[2], 0}; }
+
 bool is_dark(const OctreeNode& node) noexcept {
   return node.power[0] == 0 && node.power[1] == 0 && node.power[2] == 0;
+}
+
+// Partial sums are short and of one sign, so floats keep them; the whole is added up in double precision.
+struct Sum {
+  double v[3]{};
+  void add(Float4 part) noexcept {
+    for (int k = 0; k < 3; ++k) v[k] += static_cast<double>(part[k]);
+  }
+  Rgb rgb() const noexcept {
+    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  }
+};
+
+// Depth first, children in order. `accept(node, part)` sets the part that a node stands for, or refuses it;
+// then its children are asked, or `leaf(node)` its samples.
+template <class Accept, class Leaf>
+Sum descend(std::span<const OctreeNode> nodes, const Accept& accept, const Leaf& leaf) noexcept {
+  Sum sum;
+  std::uint32_t stack[kStackSize];
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const OctreeNode& node = nodes[stack[--top]];
+    if (is_dark(node)) continue;
+    Float4 part;
+    if (accept(node, part))
+      sum.add(part);
+    else if (node.child_count() == 0)
+      sum.add(leaf(node));
+    else
+      for (std::uint32_t c = node.child_count(); c-- > 0;) stack[top++] = node.first_child + c;
+  }
+  return sum;
 }
 
 }  // namespace
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance)
-    : group_(group), kernel_(make_profiles(medium)), allowance_(tolerance * kCalibration) {}
-
-void Exitance::add_samples(const OctreeNode& node, const Vec3& x, std::array<double, 3>& sum) const noexcept {
-  const std::size_t begin = node.first_sample, end = begin + node.sample_count();
-  const float* px = group_.planes[0].data();
-  const float* py = group_.planes[1].data();
-  const float* pz = group_.planes[2].data();
-  const float* area = group_.planes[6].data();
-  for (std::size_t i = begin; i < end; ++i) {
-    const float dx = x.x - px[i], dy = x.y - py[i], dz = x.z - pz[i];
-    const float r2 = dx * dx + dy * dy + dz * dz;
-    const Kernel::Triple r = kernel_.singular() ? kernel_.eval_disc(r2, area[i]) : kernel_.eval(r2);
-    for (std::size_t k = 0; k < 3; ++k)
-      sum[k] += static_cast<double>(r.v[k] * group_.planes[7 + k][i] * area[i]);
-  }
+    : group_(group),
+      sources_(group.size()),
+      kernel_(make_profiles(medium)),
+      allowance_(tolerance * kCalibration) {
+  parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = group.position(i);
+      const float area = group.area(i);
+      const Rgb power = group.irradiance(i) * area;
+      sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
+    }
+  });
 }
 
-// A first guess of the sum, from nodes seen under at most a fixed angle: what errors are measured against.
-Rgb Exitance::estimate(const Vec3& x, std::uint64_t& evaluations) const noexcept {
-  std::array<double, 3> sum{};
-  std::uint32_t stack[kStackSize];
-  int top = 0;
-  stack[top++] = 0;
-  while (top > 0) {
-    const OctreeNode& node = group_.nodes[stack[--top]];
-    if (is_dark(node)) continue;
-    const Offset offset = measure(node, x);
-    if (node.radius * node.radius < 0.25f * offset.r2) {
-      const Kernel::Triple r = kernel_.eval(offset.r2);
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += static_cast<double>(r.v[k] * node.power[k]);
-      ++evaluations;
-    } else if (node.child_count() == 0) {
-      add_samples(node, x, sum);
-      evaluations += node.sample_count();
-    } else {
-      for (std::uint32_t c = node.child_count(); c-- > 0;) stack[top++] = node.first_child + c;
-    }
+Float4 Exitance::sum_samples(std::size_t begin, std::size_t end, const Vec3& x) const noexcept {
+  Float4 sum = broadcast(0);
+  const bool singular = kernel_.singular();
+  for (std::size_t i = begin; i < end; ++i) {
+    const Source& s = sources_[i];
+    const float dx = x.x - s.x, dy = x.y - s.y, dz = x.z - s.z;
+    const float r2 = dx * dx + dy * dy + dz * dz;
+    sum += (singular ? kernel_.eval_disc(r2, s.area) : kernel_.eval(r2)) * s.power;
   }
-  return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
+  return sum;
+}
+
+// A first guess of the sum, from nodes seen under at most a fixed angle and from leaves as single points at
+// the distance of their rim: good to a factor of two, which is all that errors need to be measured against.
+Float4 Exitance::guess(const Vec3& x, std::uint64_t& evaluations) const noexcept {
+  const auto accept = [&](const OctreeNode& node, Float4& part) {
+    const float r2 = measure(node, x).r2, radius2 = node.radius * node.radius;
+    if (radius2 > kGuessRatio2 * r2 && node.child_count() > 0) return false;
+    part = kernel_.eval(std::max(r2, radius2)) * load(node.power);
+    ++evaluations;
+    return true;
+  };
+  const Rgb sum = descend(group_.nodes, accept, [](const OctreeNode&) { return Float4{}; }).rgb();
+  return Float4{sum.x, sum.y, sum.z, 0};
 }
 
 Rgb Exitance::eval(const Vec3& x, std::uint64_t& evaluations) const noexcept {
   if (group_.nodes.empty()) return {0, 0, 0};
   if (allowance_ <= 0) return eval_exact(x, evaluations);
-  const Rgb guess = estimate(x, evaluations);
   // A node may err by the allowance times half its own contribution and half the whole sum's share of its
   // power.
+  const Float4 total = guess(x, evaluations);
   const OctreeNode& root = group_.nodes[0];
-  float own[3], share[3];
-  for (int k = 0; k < 3; ++k) {
-    own[k] = static_cast<float>(0.5 * allowance_);
-    share[k] = root.power[k] > 0 ? own[k] * guess[k] / root.power[k] : 0.0f;
-  }
+  const Float4 own = broadcast(static_cast<float>(0.5 * allowance_));
+  Float4 share = own * total;
+  for (int k = 0; k < 3; ++k) share[k] = root.power[k] > 0 ? share[k] / root.power[k] : 0.0f;
 
-  std::array<double, 3> sum{};
-  std::uint32_t stack[kStackSize];
-  int top = 0;
-  stack[top++] = 0;
-  while (top > 0) {
-    const OctreeNode& node = group_.nodes[stack[--top]];
-    if (is_dark(node)) continue;
+  const auto accept = [&](const OctreeNode& node, Float4& part) {
     const Offset offset = measure(node, x);
-    if (offset.near2 > 0) {
-      const Kernel::Triple r = kernel_.eval(offset.r2);
-      const Kernel::Bounds& bounds = kernel_.bounds(offset.near2);
-      bool good = true;
-      for (int k = 0; k < 3; ++k) {
-        const float error =
-            0.5f * node.second_moment[k] * bounds.hessian[k] + node.first_moment[k] * bounds.slope[k];
-        good = good && error <= node.power[k] * (own[k] * r.v[k] + share[k]);
-      }
-      if (good) {
-        for (std::size_t k = 0; k < 3; ++k) sum[k] += static_cast<double>(r.v[k] * node.power[k]);
-        ++evaluations;
-        continue;
-      }
-    }
-    if (node.child_count() == 0) {
-      add_samples(node, x, sum);
-      evaluations += node.sample_count();
-    } else {
-      for (std::uint32_t c = node.child_count(); c-- > 0;) stack[top++] = node.first_child + c;
-    }
-  }
-  return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
+    if (offset.near2 <= 0) return false;
+    const Float4 power = load(node.power), r = kernel_.eval(offset.r2);
+    const Kernel::Bounds& bounds = kernel_.bounds(offset.near2);
+    const Float4 error =
+        broadcast(0.5f) * load(node.second_moment) * bounds.hessian + load(node.first_moment) * bounds.slope;
+    if (!all_at_most(error, power * (own * r + share))) return false;
+    part = r * power;
+    ++evaluations;
+    return true;
+  };
+  const auto leaf = [&](const OctreeNode& node) {
+    evaluations += node.sample_count();
+    return sum_samples(node.first_sample, node.first_sample + node.sample_count(), x);
+  };
+  return descend(group_.nodes, accept, leaf).rgb();
 }
 
 Rgb Exitance::eval_exact(const Vec3& x, std::uint64_t& evaluations) const noexcept {
-  std::array<double, 3> sum{};
-  if (!group_.nodes.empty()) add_samples(group_.nodes[0], x, sum);
+  Sum sum;
+  constexpr std::size_t kRun = 64;
+  for (std::size_t begin = 0; begin < group_.size(); begin += kRun)
+    sum.add(sum_samples(begin, std::min(begin + kRun, group_.size()), x));
   evaluations += group_.size();
-  return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
+  return sum.rgb();
 }
 
 }  // namespace nacre

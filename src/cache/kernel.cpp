@@ -96,7 +96,7 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
   }
 }
 
-Kernel::Triple Kernel::eval_disc(float r2, float area) const noexcept {
+Float4 Kernel::eval_disc(float r2, float area) const noexcept {
   const float radius = std::sqrt(area / kPi);
   const float r = std::sqrt(r2);
   if (!(r < static_cast<float>(kDiscEnd) * radius)) return eval(r2);

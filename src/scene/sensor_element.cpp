@@ -116,8 +116,13 @@ Integrator read_integrator(const XmlElement& element, Warnings& warnings) {
     if (integrator.max_depth == 0)
       fail(ErrorCode::kValue, parameters.place("maxDepth"), "maxDepth is 0, it has to be at least 1, or -1");
   }
+  if (type == "direct") {
+    constexpr int kMostSamples = 1 << 16;
+    const int shading_samples = parameters.integer("shadingSamples", 1, 1, kMostSamples);
+    integrator.emitter_samples = parameters.integer("emitterSamples", shading_samples, 1, kMostSamples);
+  }
   if (type == "direct" || type == "path") {
-    parameters.finish({}, {"emitterSamples", "bsdfSamples", "shadingSamples", "rrDepth", "strictNormals"});
+    parameters.finish({}, {"bsdfSamples", "rrDepth", "strictNormals"});
   } else {
     warnings.push_back(fmt::format("{}: integrator '{}' is not supported (there is direct, path): using path",
                                    element.place(), element.get("type")));

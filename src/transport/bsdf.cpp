@@ -35,18 +35,16 @@ Bsdf from_model(const PlasticSurface& surface) {
 }  // namespace
 
 Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
-  if (!surface) {
-    if (!medium) return from_model(DiffuseSurface{});
-    return from_model(DielectricSurface{medium->int_ior, medium->ext_ior, {1, 1, 1}, {1, 1, 1}});
-  }
-  Bsdf bsdf = std::visit([](const auto& model) { return from_model(model); }, surface->model);
-  // What passes the boundary of a medium is the medium's to answer for; its boundary is that of the medium's
-  // eta.
+  Bsdf bsdf;
+  if (surface)
+    bsdf = std::visit([](const auto& model) { return from_model(model); }, surface->model);
+  else
+    bsdf = medium ? from_model(DielectricSurface{}) : from_model(DiffuseSurface{});
+  // What passes the boundary of a medium is the medium's to answer for, and a bare boundary is that of the
+  // medium's eta.
   if (medium && bsdf.transmits) {
     bsdf.transmits = false;
     bsdf.eta = medium->eta();
-  } else if (medium) {
-    bsdf.transmits = false;
   }
   return bsdf;
 }

@@ -1,8 +1,8 @@
 // Diffuse exitance: the sum of a diffusion profile over the samples of a cache.
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "nacre/cache/cache.h"
 #include "nacre/cache/kernel.h"
@@ -26,10 +26,17 @@ class Exitance {
   Rgb eval_exact(const Vec3& x, std::uint64_t& evaluations) const noexcept;
 
  private:
-  Rgb estimate(const Vec3& x, std::uint64_t& evaluations) const noexcept;
-  void add_samples(const OctreeNode& node, const Vec3& x, std::array<double, 3>& sum) const noexcept;
+  // A sample as the inner loop reads it: position and share, then E_t A.
+  struct Source {
+    float x, y, z, area;
+    Float4 power;
+  };
+
+  Float4 guess(const Vec3& x, std::uint64_t& evaluations) const noexcept;
+  Float4 sum_samples(std::size_t begin, std::size_t end, const Vec3& x) const noexcept;
 
   const CacheGroup& group_;
+  std::vector<Source> sources_;
   Kernel kernel_;
   double allowance_;
 };

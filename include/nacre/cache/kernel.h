@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "nacre/cache/float4.h"
 #include "nacre/optics/profile.h"
 
 namespace nacre {
@@ -18,25 +19,19 @@ class Kernel {
  public:
   explicit Kernel(const std::array<Profile, 3>& profiles);
 
-  struct Triple {
-    float v[3];
-  };
-
   /// R_d at squared distance `r2`. For a singular profile not nearer than the table's start.
-  Triple eval(float r2) const noexcept {
+  Float4 eval(float r2) const noexcept {
     const Cell& cell = cells_[index(r2)];
-    const float t = static_cast<float>(bits(r2) & kFractionMask) * kFractionScale;
-    return {{cell.value[0] + t * cell.delta[0], cell.value[1] + t * cell.delta[1],
-             cell.value[2] + t * cell.delta[2]}};
+    return cell.value + broadcast(static_cast<float>(bits(r2) & kFractionMask) * kFractionScale) * cell.delta;
   }
   /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
   /// profiles (R_d of the others hardly varies over a sample's share).
-  Triple eval_disc(float r2, float area) const noexcept;
+  Float4 eval_disc(float r2, float area) const noexcept;
   bool singular() const noexcept { return singular_; }
 
   /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), and of |R'|.
   struct Bounds {
-    float hessian[3], slope[3];
+    Float4 hessian, slope;
   };
   const Bounds& bounds(float r2) const noexcept { return bounds_[bound_index(r2)]; }
 
@@ -46,8 +41,8 @@ class Kernel {
   static constexpr std::uint32_t kFractionMask = (1u << (23 - kCellBits)) - 1;
   static constexpr float kFractionScale = 1.0f / static_cast<float>(1u << (23 - kCellBits));
 
-  struct alignas(32) Cell {
-    float value[4], delta[4];
+  struct Cell {
+    Float4 value, delta;
   };
 
   static std::uint32_t bits(float r2) noexcept { return std::bit_cast<std::uint32_t>(r2); }
