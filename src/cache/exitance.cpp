@@ -76,6 +76,11 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
       sources_(group.size()),
       kernel_(make_profiles(medium)),
       allowance_(tolerance * kCalibration) {
+  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
+  if (kernel_.singular() && group.size() > 0) {
+    const auto areas = group.plane(Plane::kArea);
+    nearest2_ = Kernel::disc_reach2(*std::max_element(areas.begin(), areas.end()));
+  }
   parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3 p = group.position(i);
@@ -125,7 +130,7 @@ Rgb Exitance::eval(const Vec3& x, std::uint64_t& evaluations) const noexcept {
 
   const auto accept = [&](const OctreeNode& node, Float4& part) {
     const Offset offset = measure(node, x);
-    if (offset.near2 <= 0) return false;
+    if (offset.near2 <= nearest2_) return false;
     const Float4 power = load(node.power), r = kernel_.eval(offset.r2);
     const Kernel::Bounds& bounds = kernel_.bounds(offset.near2);
     const Float4 error =

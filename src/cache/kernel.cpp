@@ -15,15 +15,14 @@ double mean_inverse_distance(double t) {
   return 4 / kPiD * t * (std::comp_ellint_2(k) - (1 - k * k) * std::comp_ellint_1(k));
 }
 
-// The same as a table over t in [0, 4]; beyond, 1/t is right to 1 %.
+// The same as a table over t in [0, kDiscReach]; beyond, 1/t is right to 1 %.
 constexpr int kDiscCells = 256;
-constexpr double kDiscEnd = 4;
 const std::array<float, kDiscCells + 1>& disc_table() {
   static const auto table = [] {
     std::array<float, kDiscCells + 1> values{};
     for (int i = 0; i <= kDiscCells; ++i) {
       // The singularity of K at t = 1 cancels; stay off it.
-      const double t = kDiscEnd * i / kDiscCells;
+      const double t = Kernel::kDiscReach * i / kDiscCells;
       values[static_cast<std::size_t>(i)] =
           static_cast<float>(mean_inverse_distance(std::abs(t - 1) < 1e-9 ? 1.0 : t));
     }
@@ -97,16 +96,14 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
 }
 
 Float4 Kernel::eval_disc(float r2, float area) const noexcept {
+  if (!(r2 < disc_reach2(area))) return eval(r2);
   const float radius = std::sqrt(area / kPi);
-  const float r = std::sqrt(r2);
-  if (!(r < static_cast<float>(kDiscEnd) * radius)) return eval(r2);
   // R(r) r is smooth; it is taken at the distance whose inverse is the mean inverse distance.
-  const float t = r / radius * static_cast<float>(kDiscCells / kDiscEnd);
+  const float t = std::sqrt(r2) / radius * (static_cast<float>(kDiscCells) / kDiscReach);
   const auto cell = std::min(static_cast<std::size_t>(t), static_cast<std::size_t>(kDiscCells - 1));
   const float fraction = t - static_cast<float>(cell);
   const auto& table = disc_table();
-  const float inverse = (table[cell] + fraction * (table[cell + 1] - table[cell])) / radius;
-  const float effective = 1 / inverse;
+  const float effective = radius / (table[cell] + fraction * (table[cell + 1] - table[cell]));
   return eval(effective * effective);
 }
 

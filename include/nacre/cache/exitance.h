@@ -39,6 +39,7 @@ class Exitance {
   std::vector<Source> sources_;
   Kernel kernel_;
   double allowance_;
+  float nearest2_ = 0;  // squared distance within which samples are summed one by one
 };
 
 }  // namespace nacre

@@ -17,6 +17,9 @@ namespace nacre {
 /// value at sigma_tr r = 15.
 class Kernel {
  public:
+  /// Radii of a disc within which it differs from a point.
+  static constexpr float kDiscReach = 4;
+
   explicit Kernel(const std::array<Profile, 3>& profiles);
 
   /// R_d at squared distance `r2`. For a singular profile not nearer than the table's start.
@@ -27,6 +30,8 @@ class Kernel {
   /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
   /// profiles (R_d of the others hardly varies over a sample's share).
   Float4 eval_disc(float r2, float area) const noexcept;
+  /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
+  static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * area / kPi; }
   bool singular() const noexcept { return singular_; }
 
   /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), and of |R'|.
