@@ -22,7 +22,7 @@ const std::array<float, kDiscCells + 1>& disc_table() {
     std::array<float, kDiscCells + 1> values{};
     for (int i = 0; i <= kDiscCells; ++i) {
       // The singularity of K at t = 1 cancels; stay off it.
-      const double t = Kernel::kDiscReach * i / kDiscCells;
+      const double t = static_cast<double>(Kernel::kDiscReach) * i / kDiscCells;
       values[static_cast<std::size_t>(i)] =
           static_cast<float>(mean_inverse_distance(std::abs(t - 1) < 1e-9 ? 1.0 : t));
     }

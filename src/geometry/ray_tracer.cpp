@@ -3,7 +3,7 @@
 
 #include <embree3/rtcore.h>
 
-#include <limits>
+#include <algorithm>
 
 #include "nacre/base/error.h"
 
@@ -75,8 +75,7 @@ RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::u
   impl_->device.reset(rtcNewDevice(nullptr));
   const RTCDevice device = impl_->device.get();
   if (device == nullptr)
-    fail(ErrorCode::kIo, "", "Embree does not start (error {})",
-         static_cast<int>(rtcGetDeviceError(nullptr)));
+    fail(ErrorCode::kIo, "", "Embree does not start (error {})", static_cast<int>(rtcGetDeviceError(nullptr)));
   impl_->scene.reset(rtcNewScene(device));
   const RTCScene scene = impl_->scene.get();
   check(device);
@@ -130,25 +129,28 @@ Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept {
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept {
   if (mesh.normals.empty()) return face_normal(mesh, hit.triangle);
   const Triangle& t = mesh.triangles[hit.triangle];
-  const Vec3 n =
-      mesh.normals[t[0]] * (1 - hit.u - hit.v) + mesh.normals[t[1]] * hit.u + mesh.normals[t[2]] * hit.v;
+  const Vec3 n = mesh.normals[t[0]] * (1 - hit.u - hit.v) + mesh.normals[t[1]] * hit.u +
+                 mesh.normals[t[2]] * hit.v;
   const float length = n.length();
   return length > 0 ? n / length : face_normal(mesh, hit.triangle);
 }
 
 float triangle_extent(const Mesh& mesh, std::uint32_t triangle) noexcept {
   const Triangle& t = mesh.triangles[triangle];
-  const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-  return std::max({(b - a).length(), (c - b).length(), (a - c).length()});
+  const Vec3d a(mesh.positions[t[0]]), b(mesh.positions[t[1]]), c(mesh.positions[t[2]]);
+  const double ab = (b - a).length(), bc = (c - b).length(), ca = (a - c).length();
+  const double longest = std::max({ab, bc, ca});
+  const double twice_area = (b - a).cross(c - a).length();
+  const double limit = 1024 * longest;
+  return static_cast<float>(ab * bc * ca < limit * twice_area ? ab * bc * ca / twice_area : limit);
 }
 
 Vec3 offset_from_surface(const Vec3& position, const Vec3& normal, float extent) noexcept {
   constexpr float kHalfUlp = 0x1p-24f;
   const float coordinate = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
-  // Rounding moves the position and the result by half an ulp in each coordinate, up to sqrt(3) half ulps
-  // along the normal. Embree's plane equation is off by a few half ulps of the distance to the vertices.
-  const float distance = kHalfUlp * (8 * coordinate + 16 * extent);
-  return position + normal * distance;
+  // Rounding moves the position and the result by half an ulp in each coordinate: together at most
+  // 2 sqrt(3) half ulps along the normal. Embree rounds its edges to a few half ulps of their length.
+  return position + normal * (kHalfUlp * (8 * coordinate + 16 * extent));
 }
 
 }  // namespace nacre
