@@ -27,7 +27,8 @@ std::string canonical(std::string_view name) {
   fail(ErrorCode::kValue, element.place(), "{} has to be {}, not <{}>", name, expected, element.tag);
 }
 
-void check_range(double value, const Range& range, std::string_view name, const XmlElement& element) {
+void check_range(double number, const Range& range, std::string_view name, const XmlElement& element) {
+  const auto value = static_cast<float>(number);  // as it will be used, and short in the message
   const bool inside =
       range.open ? value > range.low && value < range.high : value >= range.low && value <= range.high;
   if (inside) return;
