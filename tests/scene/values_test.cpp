@@ -127,9 +127,9 @@ TEST(Transforms, AcceptWhatMitsuba3Writes) {
   expect_near(apply({element("scale", {{"value", "1 2 3"}})}, {1, 1, 1}), {1, 2, 3});
   expect_near(apply({element("scale", {{"y", "3"}})}, {1, 1, 1}), {1, 3, 1});
   expect_near(apply({element("rotate", {{"value", "0 0 1"}, {"angle", "90"}})}, {1, 0, 0}), {0, 1, 0});
-  EXPECT_THROW(apply({element("scale", {{"value", "1 2"}})}, {}), Error);
-  EXPECT_THROW(apply({element("scale", {{"value", "1"}, {"x", "2"}})}, {}), Error);
-  EXPECT_THROW(apply({element("scale", {})}, {}), Error);
+  EXPECT_THROW(apply({element("scale", {{"value", "1 2"}})}, Vec3d(0)), Error);
+  EXPECT_THROW(apply({element("scale", {{"value", "1"}, {"x", "2"}})}, Vec3d(0)), Error);
+  EXPECT_THROW(apply({element("scale", {})}, Vec3d(0)), Error);
 }
 
 TEST(Transforms, AMatrixIsWrittenInRowsForColumnVectors) {
