@@ -20,7 +20,9 @@ void refuse_both(Parameters& parameters, const char* name) {
 
 Light read_light(const XmlElement& element, Warnings& warnings) {
   Parameters parameters(element, warnings);
-  Light light{element.get("id"), element.place(), PointLight{}};
+  Light light;
+  light.id = element.get("id");
+  light.place = element.place();
   const std::string type = plugin_type(element);
   if (type == "point") {
     refuse_both(parameters, "position");

@@ -23,14 +23,15 @@ Medium read_coefficients(Parameters& parameters) {
   };
 
   Medium medium;
+  const Rgb none{0, 0, 0};
   if (separate) {
     need("sigmaS", "sigmaA");
-    medium.sigma_s = parameters.color("sigmaS", {}, kCoefficient);
-    medium.sigma_a = parameters.color("sigmaA", {}, kCoefficient);
+    medium.sigma_s = parameters.color("sigmaS", none, kCoefficient);
+    medium.sigma_a = parameters.color("sigmaA", none, kCoefficient);
   } else if (total) {
     need("sigmaT", "albedo");
-    const Rgb sigma_t = parameters.color("sigmaT", {}, kCoefficient);
-    const Rgb albedo = parameters.color("albedo", {}, kFraction);
+    const Rgb sigma_t = parameters.color("sigmaT", none, kCoefficient);
+    const Rgb albedo = parameters.color("albedo", none, kFraction);
     medium.sigma_s = sigma_t * albedo;
     medium.sigma_a = sigma_t * (Rgb(1, 1, 1) - albedo);
   } else {

@@ -56,12 +56,15 @@ Mesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnin
   fail_unknown_type(parameters.plugin(), "obj, ply, stl, off, sphere, rectangle, cube, disk, cylinder");
 }
 
+constexpr double kMinArea = 1e-30;  // below it single precision has no face normals
+
 void check_extent(const Mesh& mesh, const std::string& place) {
   for (const Vec3& p : mesh.positions)
     for (int k = 0; k < 3; ++k)
       if (!(std::abs(p[k]) < kMaxCoordinate))
-        fail(ErrorCode::kValue, place, "the shape reaches out to {:g} in world space", p[k]);
-  if (!(surface_area(mesh) > 0)) fail(ErrorCode::kValue, place, "the shape has no area in world space");
+        fail(ErrorCode::kValue, place, "the shape reaches out to {:g} in world space", std::abs(p[k]));
+  if (!(surface_area(mesh) > kMinArea))
+    fail(ErrorCode::kValue, place, "the shape has no area in world space");
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ std::string canonical(std::string_view name) {
   fail(ErrorCode::kValue, element.place(), "{} has to be {}, not <{}>", name, expected, element.tag);
 }
 
-void check_range(double value, const Range& range, std::string_view name, const XmlElement& element) {
+void check_range(double number, const Range& range, std::string_view name, const XmlElement& element) {
+  const auto value = static_cast<float>(number);  // as it will be used, and short in the message
   const bool inside =
       range.open ? value > range.low && value < range.high : value >= range.low && value <= range.high;
   if (inside) return;
@@ -79,7 +80,9 @@ int Parameters::integer(std::string_view name, int fallback, int low, int high) 
   const double value = parse_number(element->get("value"), name, *element);
   if (value != std::floor(value))
     fail(ErrorCode::kValue, element->place(), "{}: '{}' is not an integer", name, element->get("value"));
-  check_range(value, {static_cast<double>(low), static_cast<double>(high)}, name, *element);
+  if (value < low || value > high)
+    fail(ErrorCode::kValue, element->place(), "{} is {}, it has to be from {} to {}", name,
+         element->get("value"), low, high);
   return static_cast<int>(value);
 }
 
@@ -160,7 +163,9 @@ std::string Parameters::place(std::string_view name) {
   return (element ? *element : plugin_).place();
 }
 
-std::string Parameters::name() const { return fmt::format("{} '{}'", plugin_.tag, plugin_.get("type")); }
+std::string Parameters::name() const {
+  return plugin_.has("type") ? fmt::format("{} '{}'", plugin_.tag, plugin_.get("type")) : plugin_.tag;
+}
 
 void Parameters::finish(std::initializer_list<std::string_view> children,
                         std::initializer_list<std::string_view> accepted) {

@@ -92,8 +92,8 @@ SensorElement read_sensor(const XmlElement& element, Warnings& warnings) {
   camera.near_clip = parameters.number("nearClip", camera.near_clip, kPositive);
   camera.far_clip = parameters.number("farClip", camera.far_clip, kPositive);
   if (camera.near_clip >= camera.far_clip)
-    fail(ErrorCode::kValue, parameters.place("farClip"), "nearClip {} has to be below farClip {}",
-         camera.near_clip, camera.far_clip);
+    fail(ErrorCode::kValue, parameters.place(parameters.has("farClip") ? "farClip" : "nearClip"),
+         "nearClip {} has to be below farClip {}", camera.near_clip, camera.far_clip);
 
   int films = 0, samplers = 0;
   for (const XmlElement& child : element.children) {

@@ -62,7 +62,8 @@ Matrix4 parse_operation(const XmlElement& element) {
   if (element.tag == "translate") {
     matrix.setTranslation(parse_triple(element, 0.0));
   } else if (element.tag == "scale") {
-    const bool uniform = element.has("value") && split(element.get("value"), " ,\t\r\n").size() == 1;
+    const bool uniform =
+        element.attributes.size() == 1 && split(element.get("value"), " ,\t\r\n").size() == 1;
     const Vec3d factors =
         uniform ? Vec3d(parse_number(element.get("value"), "scale", element)) : parse_triple(element, 1.0);
     if (factors.x * factors.y * factors.z == 0)
