@@ -8,8 +8,8 @@
 namespace nacre {
 namespace {
 
-constexpr int kSphereLevels = 6;        // 20 * 4^6 triangles
-constexpr std::uint32_t kSectors = 256; // of disk and cylinder: the outline deviates by 8e-5 of the radius
+constexpr int kSphereLevels = 6;         // 20 * 4^6 triangles
+constexpr std::uint32_t kSectors = 256;  // of disk and cylinder: the outline deviates by 8e-5 of the radius
 
 Vec2 circle_point(std::uint32_t sector) {
   const double phi = 2 * kPiD * (sector % kSectors) / kSectors;
@@ -24,12 +24,12 @@ struct Icosphere {
 Icosphere make_icosahedron() {
   const double a = std::numbers::phi;
   Icosphere s;
-  s.points = {{-1, a, 0}, {1, a, 0}, {-1, -a, 0}, {1, -a, 0}, {0, -1, a}, {0, 1, a},
-              {0, -1, -a}, {0, 1, -a}, {a, 0, -1}, {a, 0, 1}, {-a, 0, -1}, {-a, 0, 1}};
+  s.points = {{-1, a, 0},  {1, a, 0},  {-1, -a, 0}, {1, -a, 0}, {0, -1, a},  {0, 1, a},
+              {0, -1, -a}, {0, 1, -a}, {a, 0, -1},  {a, 0, 1},  {-a, 0, -1}, {-a, 0, 1}};
   for (Vec3d& p : s.points) p.normalize();
-  s.triangles = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+  s.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
                  {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-                 {3, 8, 9},  {4, 9, 5},  {2, 4, 11},  {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+                 {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   return s;
 }
 

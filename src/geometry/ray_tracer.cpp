@@ -75,7 +75,8 @@ RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::u
   impl_->device.reset(rtcNewDevice(nullptr));
   const RTCDevice device = impl_->device.get();
   if (device == nullptr)
-    fail(ErrorCode::kIo, "", "Embree does not start (error {})", static_cast<int>(rtcGetDeviceError(nullptr)));
+    fail(ErrorCode::kIo, "", "Embree does not start (error {})",
+         static_cast<int>(rtcGetDeviceError(nullptr)));
   impl_->scene.reset(rtcNewScene(device));
   const RTCScene scene = impl_->scene.get();
   check(device);
@@ -129,8 +130,8 @@ Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept {
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept {
   if (mesh.normals.empty()) return face_normal(mesh, hit.triangle);
   const Triangle& t = mesh.triangles[hit.triangle];
-  const Vec3 n = mesh.normals[t[0]] * (1 - hit.u - hit.v) + mesh.normals[t[1]] * hit.u +
-                 mesh.normals[t[2]] * hit.v;
+  const Vec3 n =
+      mesh.normals[t[0]] * (1 - hit.u - hit.v) + mesh.normals[t[1]] * hit.u + mesh.normals[t[2]] * hit.v;
   const float length = n.length();
   return length > 0 ? n / length : face_normal(mesh, hit.triangle);
 }

@@ -37,7 +37,8 @@ class RayTracer {
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
-  /// Nearest hit, both sides of every triangle. Watertight (Embree's robust mode).
+  /// Nearest hit, both sides of every triangle. Watertight across edges (Embree's robust mode); only a ray
+  /// that meets a vertex to the last bit may slip through.
   Hit intersect(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
   /// Whether anything lies between t_min and t_max.
   bool occluded(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
@@ -55,14 +56,16 @@ Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 
-/// Length of the longest edge of a triangle.
+/// How far off a triangle's plane rays are tested, over Embree's precision: the diameter of the triangle's
+/// circumscribed circle. About its longest edge, but more for a flat obtuse one, whose plane is ill defined;
+/// at most 1024 edges.
 float triangle_extent(const Mesh& mesh, std::uint32_t triangle) noexcept;
 
 /// `position` (a hit_position) moved off the surface along the geometric `normal` (unit length; the side on
 /// which the ray is to leave) by a distance that exceeds every rounding error, so that a ray from there does
-/// not meet the surface it starts on. `extent` is the triangle_extent of the triangle that the position lies
-/// on: Embree's error grows with the distance to the vertices, the position's own with its coordinates. The
-/// distance is about 1e-6 of the larger of the two.
+/// not meet the triangle it starts on. `extent` is that triangle's triangle_extent: the error of Embree grows
+/// with it, that of the position with its coordinates. The distance is 5e-7 of the largest coordinate plus
+/// 1e-6 of the extent.
 Vec3 offset_from_surface(const Vec3& position, const Vec3& normal, float extent) noexcept;
 
 }  // namespace nacre
