@@ -49,15 +49,22 @@ class RayTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The point of a hit from the triangle's own vertices: accurate to a few ulp of their coordinates, unlike
-/// origin + t * direction.
+/// The point of a hit from the triangle's own vertices, in double precision and then rounded: within half an
+/// ulp of the triangle's plane in every coordinate, unlike origin + t * direction.
 Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 
-/// `position` moved off the surface along `normal` by a distance that exceeds the rounding error of
-/// positions, hits and rays at these coordinates, so that a ray from there does not meet the surface it
-/// starts on.
-Vec3 offset_from_surface(const Vec3& position, const Vec3& normal) noexcept;
+/// How far off a triangle's plane rays are tested, over Embree's precision: the diameter of the triangle's
+/// circumscribed circle. About its longest edge, but more for a flat obtuse one, whose plane is ill defined;
+/// at most 1024 edges.
+float triangle_extent(const Mesh& mesh, std::uint32_t triangle) noexcept;
+
+/// `position` (a hit_position) moved off the surface along the geometric `normal` (unit length; the side on
+/// which the ray is to leave) by a distance that exceeds every rounding error, so that a ray from there does
+/// not meet the triangle it starts on. `extent` is that triangle's triangle_extent: the error of Embree grows
+/// with it, that of the position with its coordinates. The distance is 5e-7 of the largest coordinate plus
+/// 1e-6 of the extent.
+Vec3 offset_from_surface(const Vec3& position, const Vec3& normal, float extent) noexcept;
 
 }  // namespace nacre

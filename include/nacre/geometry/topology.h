@@ -14,16 +14,18 @@ namespace nacre {
 struct TopologyReport {
   std::uint64_t vertices = 0;  // welded
   std::uint64_t triangles = 0;
-  std::uint64_t components = 0;               // edge-connected pieces
-  std::uint64_t boundary_edges = 0;           // edges with one face
-  std::uint64_t boundary_loops = 0;           // connected chains of boundary edges
-  std::uint64_t non_manifold_edges = 0;       // edges with more than two faces
-  std::uint64_t flipped_edges = 0;            // edges whose two faces disagree about the orientation
-  std::uint64_t duplicate_faces = 0;          // triangles over the same three vertices as an earlier one
-  std::uint64_t degenerate_triangles = 0;     // zero area, or a vertex twice
-  std::uint64_t openmesh_added_vertices = 0;  // vertices that OpenMesh had to duplicate to hold the mesh
-  double area = 0;                            // scene units^2
-  double volume = 0;                          // signed, scene units^3; meaningful when closed()
+  std::uint64_t components = 0;            // edge-connected pieces
+  std::uint64_t boundary_edges = 0;        // edges with one face
+  std::uint64_t boundary_loops = 0;        // connected chains of boundary edges
+  std::uint64_t non_manifold_edges = 0;    // edges with more than two faces
+  std::uint64_t flipped_edges = 0;         // edges whose two faces disagree about the orientation
+  std::uint64_t duplicate_faces = 0;       // triangles over the same three vertices as an earlier one
+  std::uint64_t degenerate_triangles = 0;  // zero area, or a vertex twice
+  // Copies of vertices that make the mesh an oriented manifold, which is all that OpenMesh (subdivision)
+  // holds.
+  std::uint64_t openmesh_added_vertices = 0;
+  double area = 0;    // scene units^2
+  double volume = 0;  // signed, scene units^3; meaningful when closed()
   Box3 box;
   bool closed() const { return boundary_edges == 0 && non_manifold_edges == 0; }
 };
