@@ -141,8 +141,8 @@ Scene make_showcase_scene(const std::string& mesh_path, const Medium& medium, do
 
   // The key comes from behind, where thin parts let it through; the fill opens the shadows from the front.
   add_floor(scene, size);
-  add_light(scene, "key", center + Vec3d(2.6, 2.6, -2.4) * size, center, 0.7 * size, {6.0f, 5.7f, 5.2f});
-  add_light(scene, "fill", center + Vec3d(-3.5, 3.0, 4.5) * size, center, 1.8 * size, {1.5f, 1.6f, 1.8f});
+  add_light(scene, "key", center + Vec3d(2.6, 2.6, -2.4) * size, center, 0.7 * size, {4.0f, 3.8f, 3.5f});
+  add_light(scene, "fill", center + Vec3d(-3.5, 3.0, 4.5) * size, center, 1.8 * size, {1.2f, 1.3f, 1.4f});
 
   Film film;
   film.width = film.height = 1024;
