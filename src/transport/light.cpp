@@ -14,12 +14,12 @@ LightSample sample_model(const World&, const Distribution&, const PointLight& li
   const float distance2 = to_light.length2();
   if (!(distance2 > 0)) return {};
   const float distance = std::sqrt(distance2);
-  return {to_light / distance, distance, light.intensity / distance2};
+  return {to_light / distance, distance, light.position, light.intensity / distance2};
 }
 
 LightSample sample_model(const World&, const Distribution&, const DirectionalLight& light, const Vec3&,
                          const Vec2&) {
-  return {-light.direction, std::numeric_limits<float>::infinity(), light.irradiance};
+  return {-light.direction, std::numeric_limits<float>::infinity(), {}, light.irradiance};
 }
 
 LightSample sample_model(const World& world, const Distribution& triangles, const AreaLight& light,
@@ -37,7 +37,7 @@ LightSample sample_model(const World& world, const Distribution& triangles, cons
   const float facing = -dot(to_light, normal);  // times the distance
   if (!(distance2 > 0) || !(facing > 0)) return {};
   const float distance = std::sqrt(distance2);
-  return {to_light / distance, distance,
+  return {to_light / distance, distance, p,
           light.radiance * (facing / distance / distance2 * static_cast<float>(triangles.total()))};
 }
 
@@ -51,9 +51,11 @@ LightSample sample_light(const World& world, std::size_t light, const Vec3& x, c
 
 bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
   if (!world.shadows) return true;
-  // Short of the light by more than rounding, so that its own surface does not count.
-  const float reach = std::isinf(sample.distance) ? sample.distance : sample.distance * (1 - 1e-4f);
-  return !world.tracer.occluded({origin, sample.direction, 0, reach});
+  if (std::isinf(sample.distance)) return !world.tracer.occluded({origin, sample.direction});
+  // Aimed from the origin itself, which lies off the surface, at the light's point and ending short of it by
+  // more than rounding, so that the light's own surface does not count.
+  constexpr float kReach = 1 - 1e-4f;
+  return !world.tracer.occluded({origin, sample.point - origin, 0, kReach});
 }
 
 Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
