@@ -11,6 +11,7 @@ namespace nacre {
 struct LightSample {
   Vec3 direction;           // unit, towards the light
   float distance = 0;       // scene units; infinite for directional lights
+  Vec3 point{0, 0, 0};      // on the light; not set for directional ones
   Rgb irradiance{0, 0, 0};  // on a surface that faces the light, divided by the density of the sample
 };
 
