@@ -173,9 +173,10 @@ Mesh load_mesh(const std::string& path, Warnings& warnings) {
   const std::uint64_t dropped = triangulate(raw, triangles) + (faces - raw.face_ends.size());
   if (triangles.empty()) fail(ErrorCode::kValue, path, "there is no triangle in the file");
   const std::uint64_t unused = count_unused_positions(raw);
-  if (dropped > 0 || unused > 0)
-    warnings.push_back(fmt::format("{}: left out {} degenerate faces and {} vertices that no face uses", path,
-                                   dropped, unused));
+  std::string left_out;
+  if (dropped > 0) left_out = fmt::format("{} degenerate faces", dropped);
+  if (unused > 0) left_out += fmt::format("{}{} vertices that no face uses", dropped ? " and " : "", unused);
+  if (!left_out.empty()) warnings.push_back(fmt::format("{}: left out {}", path, left_out));
   return assemble(raw, triangles);
 }
 

@@ -1,0 +1,188 @@
+// label: cli
+// The program as a user runs it: bake, render, compare; invariants between runs.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "nacre/render/image_file.h"
+#include "tools/cli.h"
+
+namespace nacre {
+namespace {
+
+using testing_support::kSmallScene;
+using testing_support::read_file;
+using testing_support::run_nacre;
+using testing_support::TemporaryFolder;
+
+class Program : public testing::Test {
+ protected:
+  void SetUp() override { folder_.write("s.xml", kSmallScene); }
+  std::string run(const std::string& arguments, int expected = 0) {
+    const auto result = run_nacre(folder_, arguments);
+    EXPECT_EQ(result.exit_code, expected) << arguments << "\n" << result.output;
+    return result.output;
+  }
+  Image image(const std::string& name) { return load_exr(folder_.file(name)); }
+  // Light layers of two pictures are bit-identical.
+  void expect_identical(const std::string& a, const std::string& b) {
+    const std::string output = run("diff " + a + " " + b + " --fail-above 0");
+    EXPECT_EQ(output.find("RMSE"), std::string::npos) << output;
+    EXPECT_NE(output.find("diffusion  identical"), std::string::npos) << output;
+    EXPECT_NE(output.find("surface    identical"), std::string::npos) << output;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Program, SaysItsVersion) { EXPECT_EQ(run("--version").rfind("nacre ", 0), 0u); }
+
+TEST_F(Program, BakesAndRenders) {
+  run("bake s.xml -o c.nacre --report bake.json");
+  run("render s.xml --cache c.nacre -o a.exr --png --report render.json");
+  const Image a = image("a.exr");
+  EXPECT_EQ(a.width, 64);
+  EXPECT_EQ(a.height, 48);
+  const Channel* diffusion = find_channel(a, "diffusion.R");
+  ASSERT_NE(diffusion, nullptr);
+  double sum = 0;
+  for (const float v : diffusion->values) sum += v;
+  EXPECT_GT(sum, 0);
+  EXPECT_EQ(a.metadata.at("nacre:seed"), "0");
+  EXPECT_EQ(a.metadata.at("nacre:fingerprint").size(), 32u);
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("a.png")));
+
+  const auto bake = nlohmann::json::parse(read_file(folder_.file("bake.json")));
+  const auto render = nlohmann::json::parse(read_file(folder_.file("render.json")));
+  EXPECT_GT(bake["counts"]["points"].get<int>(), 500);
+  EXPECT_EQ(render["counts"]["pixels"].get<int>(), 64 * 48);
+  for (const auto& report : {bake, render}) {
+    double stages = 0;
+    for (const auto& [name, seconds] : report["seconds"].items())
+      if (name != "total") stages += seconds.get<double>();
+    const double total = report["seconds"]["total"].get<double>();
+    EXPECT_NEAR(stages, total, 0.05 * total + 0.01);
+  }
+}
+
+TEST_F(Program, BeautyIsTheSumOfItsLayers) {
+  run("render s.xml -o a.exr");
+  const Image a = image("a.exr");
+  for (const std::string k : {"R", "G", "B"}) {
+    const auto& beauty = find_channel(a, k)->values;
+    for (std::size_t i = 0; i < beauty.size(); ++i) {
+      const float sum = find_channel(a, "diffusion." + k)->values[i] +
+                        find_channel(a, "specular." + k)->values[i] +
+                        find_channel(a, "surface." + k)->values[i];
+      ASSERT_EQ(beauty[i], sum) << k << i;
+    }
+  }
+}
+
+TEST_F(Program, BakedInMemoryOrBeforeIsTheSame) {
+  run("render s.xml -o a.exr --seed 3");
+  run("bake s.xml -o c.nacre --seed 3");
+  run("render s.xml --cache c.nacre -o b.exr --seed 3");
+  expect_identical("a.exr", "b.exr");
+}
+
+TEST_F(Program, ThreadsDoNotMatter) {
+  run("bake s.xml -o c1.nacre --threads 1");
+  run("bake s.xml -o c2.nacre --threads 2");
+  EXPECT_EQ(read_file(folder_.file("c1.nacre")), read_file(folder_.file("c2.nacre")));
+  run("render s.xml --cache c1.nacre -o a.exr --threads 1");
+  run("render s.xml --cache c2.nacre -o b.exr --threads 2");
+  expect_identical("a.exr", "b.exr");
+}
+
+TEST_F(Program, ACropIsAPartOfTheWhole) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o whole.exr");
+  run("render s.xml --cache c.nacre -o crop.exr --crop 20,11,25x17");
+  const Image whole = image("whole.exr"), crop = image("crop.exr");
+  EXPECT_EQ(crop.x, 20);
+  EXPECT_EQ(crop.full_width, 64);
+  for (const Channel& channel : crop.channels) {
+    const Channel* full = find_channel(whole, channel.name);
+    ASSERT_NE(full, nullptr);
+    for (int y = 0; y < 17; ++y)
+      for (int x = 0; x < 25; ++x)
+        ASSERT_EQ(channel.values[static_cast<std::size_t>(y * 25 + x)],
+                  full->values[static_cast<std::size_t>((y + 11) * 64 + x + 20)])
+            << channel.name;
+  }
+}
+
+TEST_F(Program, SeedsMatter) {
+  run("render s.xml -o a.exr --seed 1");
+  run("render s.xml -o b.exr --seed 2");
+  run("diff a.exr b.exr --fail-above 0", 1);
+}
+
+TEST_F(Program, ANewMaterialUsesTheOldCache) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o a.exr");
+  run("render s.xml --cache c.nacre -o b.exr -D sigma_a=0.3");
+  run("diff a.exr b.exr --layer diffusion --fail-above 0.01", 1);
+}
+
+TEST_F(Program, AMovedLightIsRefusedByName) {
+  run("bake s.xml -o c.nacre");
+  const std::string output = run("render s.xml --cache c.nacre -o b.exr -D light_x=21", 1);
+  EXPECT_NE(output.find("light spark/position was 20 30 10 and is 21 30 10"), std::string::npos) << output;
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("b.exr")));
+}
+
+TEST_F(Program, ShadowsArePartOfTheCache) {
+  run("bake s.xml -o c.nacre --no-shadows");
+  EXPECT_NE(run("render s.xml --cache c.nacre -o a.exr", 1).find("shadows was no and is yes"),
+            std::string::npos);
+  run("render s.xml --cache c.nacre -o a.exr --no-shadows");
+}
+
+TEST_F(Program, HierarchicalMeetsItsTolerance) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o exact.exr --method exact");
+  run("render s.xml --cache c.nacre -o fast.exr");
+  run("render s.xml --cache c.nacre -o zero.exr --tolerance 0");
+  run("diff fast.exr exact.exr --layer diffusion --fail-above 0.01");
+  expect_identical("zero.exr", "exact.exr");
+}
+
+TEST_F(Program, OtherCamerasAndSizes) {
+  run("render s.xml -o a.exr --camera other");
+  EXPECT_EQ(image("a.exr").width, 32);
+  run("render s.xml -o b.exr --size 40x20 --spp 1 --aov none");
+  EXPECT_EQ(image("b.exr").width, 40);
+  EXPECT_EQ(image("b.exr").channels.size(), 4u);
+  EXPECT_NE(run("render s.xml -o c.exr --camera third", 1).find("other"), std::string::npos);
+}
+
+TEST_F(Program, InfoOnEverything) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o a.exr");
+  const std::string scene = run("info s.xml");
+  EXPECT_NE(scene.find("size 10 10 10 mm"), std::string::npos) << scene;
+  EXPECT_NE(scene.find("l'"), std::string::npos);
+  const std::string cache = run("info c.nacre --check");
+  EXPECT_NE(cache.find("sound"), std::string::npos);
+  EXPECT_NE(cache.find("shares add up to 1.0000"), std::string::npos) << cache;
+  EXPECT_NE(run("info a.exr").find("diffusion.R"), std::string::npos);
+  EXPECT_NE(run("materials").find("Spectralon"), std::string::npos);
+}
+
+TEST_F(Program, AMeshFileIsAScene) {
+  folder_.write("block.obj",
+                "v 0 0 0\nv 2 0 0\nv 2 3 0\nv 0 3 0\nv 0 0 2\nv 2 0 2\nv 2 3 2\nv 0 3 2\n"
+                "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n");
+  run("render block.obj --material marble --height 20 -o a.exr --png --size 48x48 --spp 2");
+  const Image a = image("a.exr");
+  double sum = 0;
+  for (const float v : find_channel(a, "diffusion.G")->values) sum += v;
+  EXPECT_GT(sum, 0);
+  EXPECT_NE(run("render block.obj --material marbel -o b.exr", 1).find("Marble"), std::string::npos);
+}
+
+TEST_F(Program, QuietMeansQuiet) { EXPECT_EQ(run("render s.xml -o a.exr --quiet --spp 1"), ""); }
+
+}  // namespace
+}  // namespace nacre
