@@ -7,7 +7,7 @@ namespace nacre {
 namespace {
 
 constexpr float kLeastAlphaPrime = 0.5f;
-constexpr double kLeastThickness = 4;  // mean free paths
+constexpr double kLeastThickness = 3;  // mean free paths
 
 }  // namespace
 

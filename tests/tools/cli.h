@@ -96,7 +96,7 @@ inline const char* const kSmallScene = R"(<scene version="0.6.0">
     <point name="center" x="0" y="5" z="0"/>
     <float name="radius" value="5"/>
     <subsurface type="dipole" id="wax">
-      <rgb name="sigmaS" value="1.5, 1.2, 0.9"/>
+      <rgb name="sigmaS" value="3, 2.5, 2"/>
       <rgb name="sigmaA" value="$sigma_a, 0.02, 0.03"/>
       <float name="scale" value="1"/>
     </subsurface>

@@ -54,7 +54,7 @@ TEST_F(Errors, WrongType) {
   expect_refusal("render b.xml -o a.exr", 1, "b.xml:6");
 }
 
-TEST_F(Errors, NegativeCoefficient) { expect_refusal("render s.xml -o a.exr -D sigma_a=-1", 1, "s.xml:21"); }
+TEST_F(Errors, NegativeCoefficient) { expect_refusal("render s.xml -o a.exr -D sigma_a=-1", 1, "s.xml:20"); }
 
 TEST_F(Errors, EmptyMesh) {
   folder_.write("empty.obj", "# nothing\n");
