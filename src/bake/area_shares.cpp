@@ -73,7 +73,7 @@ class ShareComputer {
         spacing_(
             static_cast<float>(hexagonal_spacing(surface.areas.total(), static_cast<double>(points.size())))),
         coordinates_(3 * points.size()),
-        edges_(surface.sheet_edges, kReach * spacing_) {
+        edges_(surface.sheet_edges, points, kReach * spacing_) {
     for (std::size_t i = 0; i < points.size(); ++i)
       for (int axis = 0; axis < 3; ++axis)
         coordinates_[3 * i + static_cast<std::size_t>(axis)] = points[i].position[axis];
@@ -131,34 +131,32 @@ class ShareComputer {
   }
 
   // A border or a crease is a side of the cell where its nearest point to the sample is inside an edge, or is
-  // the corner of a border that bends away. Isolated short creases, which noise in a scan makes, end nothing.
+  // the corner of a border that bends away. Of a border in short edges that is one edge, however many are
+  // near. Isolated short creases, which noise in a scan makes, end nothing.
   void clip_at_edges(const PlacedPoint& point, const Frame& frame, Cell& cell) const {
-    struct Side {
-      Vec3 offset;
-      bool inside_edge;
-    };
-    std::array<Side, 32> sides;
-    std::size_t count = 0, nearest = 0;
-    float length = 0;
+    std::array<Vec3, 32> sides;  // the nearest of all comes first
+    std::size_t count = 1;
+    float length = 0, nearest2 = square(kReach * spacing_);
     edges_.for_each_near(point.position, [&](const SheetEdge& edge) {
-      if (count == sides.size() || dot(edge.normal, point.normal) <= kSameSheetCosine) return;
+      if (edge.normal != Vec3(0) && dot(edge.normal, point.normal) <= kSameSheetCosine) return;
       const Vec3 along = edge.b - edge.a;
       const float length2 = along.length2();
       const float t = length2 > 0 ? dot(point.position - edge.a, along) / length2 : 0.0f;
       const Vec3 offset = edge.a + along * std::clamp(t, 0.0f, 1.0f) - point.position;
       if (offset.length2() > square(kReach * spacing_)) return;
       length += std::sqrt(length2);
-      sides[count] = {offset, t >= 0 && t <= 1};
-      if (offset.length2() < sides[nearest].offset.length2()) nearest = count;
-      ++count;
+      if (t >= 0 && t <= 1 && count < sides.size()) sides[count++] = offset;
+      if (offset.length2() <= nearest2) {
+        nearest2 = offset.length2();
+        sides[0] = offset;
+      }
     });
     if (length < spacing_) return;
-    for (std::size_t i = 0; i < count; ++i)
-      if (sides[i].inside_edge || i == nearest) {
-        const Vec2 flat(dot(sides[i].offset, frame.s), dot(sides[i].offset, frame.t));
-        const float flat_length = flat.length();
-        if (flat_length > 0) cell.clip(flat / flat_length, sides[i].offset.length());
-      }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec2 flat(dot(sides[i], frame.s), dot(sides[i], frame.t));
+      const float flat_length = flat.length();
+      if (flat_length > 0) cell.clip(flat / flat_length, sides[i].length());
+    }
   }
 
   const GroupSurface& surface_;

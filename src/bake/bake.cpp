@@ -105,7 +105,7 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     plan.points += group.points;
   }
   plan.bytes = 4096 + plan.points * kBytesPerSample;
-  if (plan.points > kMostPoints)
+  if (!(plan.points <= kMostPoints))
     fail(ErrorCode::kLimit, scene.path,
          "the bake would need {:.3g} samples, more than {:.0f} million; check `scale` (mm per scene unit) or "
          "give --spacing or --points",

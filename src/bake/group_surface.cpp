@@ -15,6 +15,7 @@ struct HalfEdge {
 };
 
 constexpr std::size_t kMostFacesPerEdge = 8;
+constexpr std::uint64_t kNoEdge = ~std::uint64_t{0};  // sorts last
 
 // Union-find with path halving.
 std::uint32_t find_root(std::vector<std::uint32_t>& parents, std::uint32_t i) {
@@ -22,15 +23,30 @@ std::uint32_t find_root(std::vector<std::uint32_t>& parents, std::uint32_t i) {
   return i;
 }
 
+// Whether a triangle is so thin that the rounding of its vertices, not the surface, decides its normal.
+bool is_thin(const GroupSurface& surface, std::size_t triangle, double area) {
+  float coordinate = 0;
+  for (const std::uint32_t v : surface.triangles[triangle])
+    for (int axis = 0; axis < 3; ++axis)
+      coordinate = std::max(coordinate, std::abs(surface.positions[v][axis]));
+  const double extent = static_cast<double>(surface.extent(triangle));
+  return 2 * area <= 0x1p-21 * static_cast<double>(coordinate) * extent;
+}
+
 std::vector<HalfEdge> sorted_half_edges(const GroupSurface& surface, const std::vector<std::uint32_t>& weld) {
   std::vector<HalfEdge> edges(surface.triangles.size() * 3);
   parallel_for(surface.triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
+    for (std::size_t t = begin; t < end; ++t) {
+      const Triangle& corners = surface.triangles[t];
+      const std::uint64_t v[3] = {weld[corners[0]], weld[corners[1]], weld[corners[2]]};
+      // A triangle that has a vertex twice is no more than an edge, and joins nothing.
+      const bool collapsed = v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
       for (std::uint32_t c = 0; c < 3; ++c) {
-        const std::uint64_t from = weld[surface.triangles[t][c]],
-                            to = weld[surface.triangles[t][(c + 1) % 3]];
-        edges[3 * t + c] = {std::min(from, to) << 32 | std::max(from, to), static_cast<std::uint32_t>(t), c};
+        const std::uint64_t from = v[c], to = v[(c + 1) % 3];
+        edges[3 * t + c] = {collapsed ? kNoEdge : std::min(from, to) << 32 | std::max(from, to),
+                            static_cast<std::uint32_t>(t), c};
       }
+    }
   });
   parallel_sort(edges.begin(), edges.end(), [](const HalfEdge& x, const HalfEdge& y) {
     return x.key != y.key ? x.key < y.key : 3ull * x.triangle + x.corner < 3ull * y.triangle + y.corner;
@@ -78,22 +94,23 @@ GroupSurface make_group_surface(std::span<const Mesh* const> meshes) {
   std::iota(parents.begin(), parents.end(), 0u);
   const auto add_sheet_edge = [&](const HalfEdge& edge) {
     const Triangle& t = surface.triangles[edge.triangle];
-    if (areas[edge.triangle] > 0)
-      surface.sheet_edges.push_back({surface.positions[t[edge.corner]],
-                                     surface.positions[t[(edge.corner + 1) % 3]],
-                                     surface.normal(edge.triangle)});
+    const double area = areas[edge.triangle];
+    if (area > 0)
+      surface.sheet_edges.push_back(
+          {surface.positions[t[edge.corner]], surface.positions[t[(edge.corner + 1) % 3]],
+           is_thin(surface, edge.triangle, area) ? Vec3(0) : surface.normal(edge.triangle)});
   };
-  for (std::size_t begin = 0; begin < edges.size();) {
+  for (std::size_t begin = 0; begin < edges.size() && edges[begin].key != kNoEdge;) {
     std::size_t end = begin + 1;
     while (end < edges.size() && edges[end].key == edges[begin].key) ++end;
     for (std::size_t i = begin + 1; i < end; ++i)
       parents[find_root(parents, edges[i].triangle)] = find_root(parents, edges[begin].triangle);
-    // A face without a partner that goes on in its direction ends at this edge. Degenerate partners have no
-    // direction and do not count as an end; nor do edges where so many faces meet that they are no border of
-    // anything.
+    // A face without a partner that goes on in its direction ends at this edge. Thin ones have no direction
+    // and do not count as an end; nor do edges where so many faces meet that they are no border of anything.
     const auto continues = [&](std::size_t i, std::size_t j) {
-      return areas[edges[j].triangle] <= 0 ||
-             dot(surface.normal(edges[i].triangle), surface.normal(edges[j].triangle)) > kSameSheetCosine;
+      const std::uint32_t a = edges[i].triangle, b = edges[j].triangle;
+      return is_thin(surface, a, areas[a]) || is_thin(surface, b, areas[b]) ||
+             dot(surface.normal(a), surface.normal(b)) > kSameSheetCosine;
     };
     for (std::size_t i = begin; i < end && end - begin <= kMostFacesPerEdge; ++i) {
       bool goes_on = false;

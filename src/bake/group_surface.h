@@ -20,7 +20,8 @@ inline constexpr float kSameSheetCosine = 0.2f;
 /// An edge that bounds a sheet: a border of the surface or a crease sharper than kSameSheetCosine.
 struct SheetEdge {
   Vec3 a, b;
-  Vec3 normal;  // of one face at the edge; a crease is listed once for each of its faces
+  Vec3 normal;  // of one face at the edge; a crease is listed once for each of its faces. Zero for a face so
+                // thin that it has none: its border is one for every sheet
 };
 
 struct GroupSurface {

@@ -100,7 +100,6 @@ class DartThrower {
     // Block coordinates have to fit their bits; where space is that large blocks hold more than a block's
     // cells, which is then the caller's limit on the number of points.
     block_size_ = radius_ * static_cast<float>(kBlockCells);
-    candidates_.resize(std::max<std::size_t>(static_cast<std::size_t>(target), 256));
   }
 
   static bool fits(const GroupSurface& surface, double target) {
@@ -111,7 +110,8 @@ class DartThrower {
     return std::max({size.x, size.y, size.z}) / block < (1 << kCoordinateBits) - 2;
   }
 
-  void throw_round(int round) {
+  void throw_round(int round, std::size_t candidates) {
+    candidates_.resize(candidates);
     make_candidates(round);
     parallel_sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
       return a.key != b.key ? a.key < b.key
@@ -120,6 +120,12 @@ class DartThrower {
     });
     find_runs();
     for (unsigned phase = 0; phase < 8; ++phase) throw_phase(phase);
+  }
+
+  std::size_t count() const {
+    std::size_t sum = 0;
+    for (const Block& block : blocks_) sum += block.points.size();
+    return sum;
   }
 
   std::vector<PlacedPoint> take_points() {
@@ -238,8 +244,16 @@ std::vector<PlacedPoint> place_points(const GroupSurface& surface, double target
          "the samples are too close together for an object of this size; check `scale` or use fewer points");
   DartThrower thrower(surface, target, seed);
   progress.begin("placing samples", "rounds", kRounds);
+  // On dust and hair, which have room for any number of points, nearly every dart sticks: no round throws
+  // more than are missing at the rate at which those of the round before stuck.
+  const double most = std::max(target, 256.0);
+  double rate = 1;
   for (int round = 0; round < kRounds; ++round) {
-    thrower.throw_round(round);
+    const auto before = static_cast<double>(thrower.count());
+    if (before >= target) break;
+    const double candidates = std::ceil(std::min(most, (target - before) / rate));
+    thrower.throw_round(round, static_cast<std::size_t>(candidates));
+    rate = (static_cast<double>(thrower.count()) - before) / candidates;
     progress.advance(1);
   }
   progress.end();
