@@ -138,23 +138,33 @@ class PixelLoop {
     }
   }
 
+  // The points of one medium together, so that those near each other share their work.
   void add_diffusion(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const {
-    std::uint64_t evaluations = 0, points = 0;
-    for (const Path& path : paths) {
-      if (!path.hit || world_.shape(path.hit).medium == kNone) continue;
-      const Material& material = materials_[static_cast<std::size_t>(world_.shape(path.hit).medium)];
-      const SurfacePoint point = surface_point(world_, path.hit);
-      const float cos_o = exit_cosine(point, path.ray.direction);
-      const Rgb exitance = params_.method == Method::kExact
-                               ? material.exitance.eval_exact(point.position, evaluations)
-                               : material.exitance.eval(point.position, evaluations);
-      const float through = (1 - fresnel_reflectance(cos_o, material.eta)) * material.exit_factor;
-      const Layer layer = wave == 0 ? Layer::kDiffusion : path.layer;
-      pixels.add(layer, path.pixel, path.throughput * exitance * through);
-      ++points;
+    std::uint64_t evaluations = 0;
+    for (std::size_t m = 0; m < materials_.size(); ++m) {
+      const Material& material = materials_[m];
+      std::vector<const Path*> hits;
+      std::vector<Vec3> points;
+      for (const Path& path : paths) {
+        if (!path.hit || world_.shape(path.hit).medium != static_cast<int>(m)) continue;
+        hits.push_back(&path);
+        points.push_back(hit_position(world_.shape(path.hit).mesh, path.hit));
+      }
+      std::vector<Rgb> exitance(points.size());
+      if (params_.method == Method::kExact)
+        material.exitance.eval_exact(points, exitance, evaluations);
+      else
+        material.exitance.eval(points, exitance, evaluations);
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const Path& path = *hits[i];
+        const float cos_o = exit_cosine(surface_point(world_, path.hit), path.ray.direction);
+        const float through = (1 - fresnel_reflectance(cos_o, material.eta)) * material.exit_factor;
+        pixels.add(wave == 0 ? Layer::kDiffusion : path.layer, path.pixel,
+                   path.throughput * exitance[i] * through);
+      }
+      totals.shading_points += hits.size();
     }
     totals.evaluations += evaluations;
-    totals.shading_points += points;
   }
 
   // Cosine between the way out and the interpolated normal on the visible side. Where interpolation turns the

@@ -44,8 +44,10 @@ double measure_blotch(const GroupSurface& surface, double spacing, const std::ve
   const Exitance exitance(group, marble(), 0);
   std::uint64_t evaluations = 0;
   double sum = 0, sum2 = 0;
-  for (const Vec3& probe : probes) {
-    const double value = static_cast<double>(exitance.eval_exact(probe, evaluations)[kBlue]);
+  std::vector<Rgb> values(probes.size());
+  exitance.eval_exact(probes, values, evaluations);
+  for (const Rgb& rgb : values) {
+    const double value = static_cast<double>(rgb[kBlue]);
     sum += value;
     sum2 += value * value;
   }
