@@ -37,7 +37,8 @@ class RayTracer {
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
-  /// Nearest hit, both sides of every triangle. Watertight (Embree's robust mode).
+  /// Nearest hit, both sides of every triangle. Watertight across edges (Embree's robust mode); only a ray
+  /// that meets a vertex to the last bit may slip through.
   Hit intersect(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
   /// Whether anything lies between t_min and t_max.
   bool occluded(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
