@@ -208,17 +208,20 @@ GuardedFile guard_stl(std::string content, const std::string& path) {
 GuardedFile guard_off(std::string content, const std::string& path) {
   GuardedFile file{std::move(content)};
   std::string& text = file.content;
-  text += '\n';
-  for (std::size_t at = text.find('#'); at != std::string::npos; at = text.find('#', at))
-    for (; text[at] != '\n'; ++at) text[at] = ' ';
+  if (!text.ends_with('\n')) text += '\n';
+  bool in_comment = false;
+  for (char& c : text) {
+    in_comment = c != '\n' && (in_comment || c == '#');
+    if (in_comment || is_blank(c)) c = ' ';
+  }
 
   LineReader lines(text, path);
   lines.require_next("OFF");
   std::string_view rest = lines.line();
   const std::string_view header = take_word(rest);
   const OffFlavour flavour = parse_off_flavour(lines, header, rest);
-  if ((flavour.normals || flavour.uvs) && lines.number() != 1)
-    lines.fail_here(ErrorCode::kUnsupported, "{} has to be the first line of the file", quote_word(header));
+  if ((flavour.normals || flavour.uvs) && header.data() != text.data())
+    lines.fail_here(ErrorCode::kUnsupported, "the file has to begin with {}", quote_word(header));
   OpenMesh::IO::OFFReader().can_u_read(path);
   // OpenMesh skips one line, whatever it holds, before the counts.
   const auto header_end = rest.data() - text.data();
@@ -227,6 +230,8 @@ GuardedFile guard_off(std::string content, const std::string& path) {
   if (rest.find_first_not_of(" \t\r\n\v\f") == std::string_view::npos) {
     lines.require_next("the number of vertices");
     rest = lines.line();
+  } else {
+    rest.remove_prefix(1);
   }
   std::array<std::int64_t, 3> counts;  // vertices, faces, edges
   for (std::int64_t& count : counts) {

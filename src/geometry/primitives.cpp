@@ -2,6 +2,7 @@
 #include "nacre/geometry/primitives.h"
 
 #include <map>
+#include <set>
 
 #include "nacre/base/error.h"
 
@@ -71,6 +72,7 @@ Mesh make_sphere() {
   // u jumps from 1 to 0 at phi = 0 and is undefined at the poles: the triangles there get vertices of their
   // own, so that u runs on beyond 1 and every triangle at a pole has the u of its middle there.
   std::map<std::uint32_t, std::uint32_t> beyond_seam;
+  std::set<std::uint32_t> taken_poles;
   const auto add_copy = [&](std::uint32_t v, float u) {
     const Vec3 position = mesh.positions[v];
     mesh.positions.push_back(position);
@@ -93,8 +95,13 @@ Mesh make_sphere() {
     float sum = 0;
     for (const std::uint32_t v : t)
       if (!is_pole(v)) sum += mesh.uvs[v].x;
-    for (std::uint32_t& v : t)
-      if (is_pole(v)) v = add_copy(v, 0.5f * sum);
+    for (std::uint32_t& v : t) {
+      if (!is_pole(v)) continue;
+      if (taken_poles.insert(v).second)
+        mesh.uvs[v].x = 0.5f * sum;
+      else
+        v = add_copy(v, 0.5f * sum);
+    }
   }
   mesh.normals = mesh.positions;
   for (Vec3& n : mesh.normals) n.normalize();
