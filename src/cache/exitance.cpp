@@ -11,10 +11,11 @@ namespace {
 // Deepest stack of a depth-first descent: seven siblings wait on each level.
 constexpr int kStackSize = 7 * (kMaxOctreeDepth + 1) + 8;
 
-// The bound holds for the worst arrangement of samples inside a node and adds up errors that mostly cancel;
-// what happens is smaller by more than this factor (measured over the test scenes), which `tolerance`, a
-// relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 24;
+// The estimate of a node's error takes all its samples to lie where the profile bends most and adds up errors
+// that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
+// shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
+// a relative RMSE over a picture, makes use of.
+constexpr double kCalibration = 7;
 
 // The first guess opens nodes that are seen under more than this ratio of radius to distance.
 constexpr float kGuessRatio2 = 0.7f * 0.7f;
@@ -104,12 +105,13 @@ Float4 Exitance::sum_samples(std::size_t begin, std::size_t end, const Vec3& x) 
 }
 
 // A first guess of the sum, from nodes seen under at most a fixed angle and from leaves as single points at
-// the distance of their rim: good to a factor of two, which is all that errors need to be measured against.
+// the distance of their rim, or of half a sample's disc from where R has no bound: good to a factor of two,
+// which is all that errors need to be measured against.
 Float4 Exitance::guess(const Vec3& x, std::uint64_t& evaluations) const noexcept {
   const auto accept = [&](const OctreeNode& node, Float4& part) {
     const float r2 = measure(node, x).r2, radius2 = node.radius * node.radius;
     if (radius2 > kGuessRatio2 * r2 && node.child_count() > 0) return false;
-    part = kernel_.eval(std::max(r2, radius2)) * load(node.power);
+    part = kernel_.eval(std::max({r2, radius2, nearest2_ / 64})) * load(node.power);
     ++evaluations;
     return true;
   };
@@ -132,7 +134,7 @@ Rgb Exitance::eval(const Vec3& x, std::uint64_t& evaluations) const noexcept {
     const Offset offset = measure(node, x);
     if (offset.near2 <= nearest2_) return false;
     const Float4 power = load(node.power), r = kernel_.eval(offset.r2);
-    const Kernel::Bounds& bounds = kernel_.bounds(offset.near2);
+    const Kernel::Bounds& bounds = kernel_.bounds(offset.r2);
     const Float4 error =
         broadcast(0.5f) * load(node.second_moment) * bounds.hessian + load(node.first_moment) * bounds.slope;
     if (!all_at_most(error, power * (own * r + share))) return false;

@@ -18,9 +18,9 @@ class Exitance {
   Exitance(const CacheGroup& group, const Medium& medium, double tolerance);
 
   /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at a point in scene units, by descent of the octree:
-  /// a node stands for its samples where a second-order bound of the error this makes is small against the
-  /// whole sum. Counts evaluated nodes and samples in `evaluations`. Source: Jensen & Buhler 2002 for the
-  /// hierarchy; the error bound is nacre's own.
+  /// a node stands for its samples where a second-order estimate of the error this makes is small against
+  /// the whole sum. Counts evaluated nodes and samples in `evaluations`. Source: Jensen & Buhler 2002 for the
+  /// hierarchy; the error estimate is nacre's own.
   Rgb eval(const Vec3& x, std::uint64_t& evaluations) const noexcept;
   /// The same sum over every sample, in octree order.
   Rgb eval_exact(const Vec3& x, std::uint64_t& evaluations) const noexcept;
