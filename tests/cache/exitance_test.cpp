@@ -126,7 +126,7 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
         const SurfaceSamples samples = shape.make(shape.n, lighting.light);
         const OwnedGroup owned = make_group(samples);
         const float scale = default_scale(preset, samples);
-        for (const float coarser : {1.0f, 8.0f}) {  // a large mean free path sees many samples at once
+        for (const float coarser : {1.0f, 4.0f, 8.0f}) {  // a large mean free path sees many samples at once
           const Medium medium = make_material(preset, GetParam(), scale / coarser);
           const Exitance exact(owned.group, medium, 0);
           std::vector<Vec3> points;
