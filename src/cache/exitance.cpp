@@ -16,7 +16,7 @@ constexpr int kStackSize = 7 * (kMaxOctreeDepth + 1) + 8;
 // that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
 // shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
 // a relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 7;
+constexpr double kCalibration = 6.5;
 
 // The first guess opens nodes that are seen under more than this ratio of radius to distance.
 constexpr float kGuessRatio2 = 0.7f * 0.7f;

@@ -25,12 +25,13 @@ std::string digest(const HashState& state) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
-std::string hash_geometry(const Mesh& mesh) {
+std::string hash_geometry(const Mesh& mesh, bool with_normals) {
   const HashState state = make_hash();
   const std::uint64_t counts[2] = {mesh.positions.size(), mesh.triangles.size()};
   XXH3_128bits_update(state.get(), counts, sizeof counts);
   XXH3_128bits_update(state.get(), mesh.positions.data(), mesh.positions.size() * sizeof(Vec3));
   XXH3_128bits_update(state.get(), mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle));
+  if (with_normals) XXH3_128bits_update(state.get(), mesh.normals.data(), mesh.normals.size() * sizeof(Vec3));
   return digest(state);
 }
 
@@ -51,10 +52,12 @@ class Fingerprinter {
     for (const Shape& shape : scene_.shapes) {
       if (casts_no_light(shape)) continue;
       const std::string name = "shape " + shape.id;
-      add(name + "/geometry", hash_geometry(shape.mesh));
+      // Samples lie on the faces and have their normals; light bounces off the smooth normals.
+      const bool reflects = bounce_matters() && shape.medium == kNone;
+      add(name + "/geometry", hash_geometry(shape.mesh, reflects));
       add(name + "/medium",
           shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
-      if (bounce_matters() && shape.medium == kNone) add_surface(name, shape);
+      if (reflects) add_surface(name, shape);
     }
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       name_ = "light " + light_name(scene_, i);
@@ -116,8 +119,10 @@ const std::string* find_value(const KeyValues& entries, const std::string& key) 
   return nullptr;
 }
 
-bool ends_with(const std::string& text, std::string_view end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+// Whether a key is of that kind: "medium wax/bounces", or "medium wax/bounces (2)" of another one of that
+// name.
+bool is_kind(const std::string& key, const std::string& kind) {
+  return key.ends_with(kind) || key.find(kind + " (") != key.npos;
 }
 
 }  // namespace
@@ -129,7 +134,7 @@ KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, boo
 std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups) {
   std::vector<int> bounces;
   for (const auto& [key, value] : fingerprint)
-    if (ends_with(key, "/bounces")) {
+    if (is_kind(key, "/bounces")) {
       int count = 0;
       std::from_chars(value.data(), value.data() + value.size(), count);
       bounces.push_back(std::max(0, count));
@@ -158,12 +163,12 @@ std::string describe_mismatch(const KeyValues& cached, const KeyValues& current)
     if (!now)
       note(key + " is gone");
     else if (*now != value)
-      note(ends_with(key, "/geometry") ? key + " has changed"
-                                       : fmt::format("{} was {} and is {}", key, value, *now));
+      note(is_kind(key, "/geometry") ? key + " has changed"
+                                     : fmt::format("{} was {} and is {}", key, value, *now));
   }
   for (const auto& [key, value] : current)
     if (!find_value(cached, key))
-      note(ends_with(key, "/geometry") ? key + " is new" : fmt::format("{} is new ({})", key, value));
+      note(is_kind(key, "/geometry") ? key + " is new" : fmt::format("{} is new ({})", key, value));
   if (count > 3) differences += fmt::format("; and {} more", count - 3);
   return differences;
 }

@@ -16,7 +16,7 @@ double mean_inverse_distance(double t) {
 }
 
 // The same as a table over t in [0, kDiscReach]; beyond, 1/t is right to 1 %.
-constexpr int kDiscCells = 256;
+constexpr int kDiscCells = 1024;
 const std::array<float, kDiscCells + 1>& disc_table() {
   static const auto table = [] {
     std::array<float, kDiscCells + 1> values{};
@@ -42,7 +42,7 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
     if (p.total <= 0) continue;
     narrowest = std::min(narrowest, p.width);
     // Beyond 80 decay lengths exp underflows what a float can hold next to the centre's value; without
-    // absorption R falls like r^-3 and what lies beyond 1e5 widths is 1e-5 of the total.
+    // absorption R falls like r^-3 and what lies beyond 1e6 widths is some 1e-6 of the total.
     for (const Profile::Term& t : p.terms)
       widest = std::max(widest, t.sigma > 0 ? std::min(80 / t.sigma, 1e6 * p.width) : 1e6 * p.width);
   }

@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <optional>
 
 #include "cache/cache_layout.h"
 #include "nacre/base/error.h"
@@ -24,7 +23,8 @@ namespace {
 class MappedFile {
  public:
   explicit MappedFile(const std::string& path) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    // Not blocking: a pipe has to be refused, not waited for.
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (descriptor < 0) {
       const int error = errno;
       fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path,
@@ -70,36 +70,36 @@ class Reader {
   std::uint32_t group_count() const { return header_.group_count; }
   std::shared_ptr<const void> storage() const { return file_; }
 
-  std::span<const unsigned char> section(std::array<char, 4> kind, std::uint32_t group) const {
-    if (const auto* found = find(kind, group)) return {file_->data() + found->offset, found->size};
-    fail(ErrorCode::kDamaged, path_, "section {} of group {} is missing; bake the cache again", name(kind),
-         group);
+  std::span<const unsigned char> section(layout::Kind kind, std::uint32_t group) const {
+    const auto& entry = find(kind, group);
+    return {file_->data() + entry.offset, entry.size};
   }
 
   template <class T>
-  std::span<const T> array(std::array<char, 4> kind, std::uint32_t group) const {
+  std::span<const T> array(layout::Kind kind, std::uint32_t group) const {
     const auto bytes = section(kind, group);
     if (bytes.size() % sizeof(T) != 0) damaged(kind, group, "its size is no multiple of its element's");
     return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
   }
 
-  [[noreturn]] void damaged(std::array<char, 4> kind, std::uint32_t group, const std::string& reason) const {
-    const auto* found = find(kind, group);
-    fail(ErrorCode::kDamaged, fmt::format("{}: byte {}", path_, found ? found->offset : 0),
+  [[noreturn]] void damaged(layout::Kind kind, std::uint32_t group, const std::string& reason) const {
+    fail(ErrorCode::kDamaged, fmt::format("{}: byte {}", path_, find(kind, group).offset),
          "section {} of group {} is damaged: {}; bake the cache again", name(kind), group, reason);
   }
 
  private:
-  static std::string name(std::array<char, 4> kind) {
+  static std::string name(layout::Kind kind) {
     std::string text;
     for (const char c : kind) text += c >= ' ' && c <= '~' ? c : '?';
     return text;
   }
 
-  const layout::SectionEntry* find(std::array<char, 4> kind, std::uint32_t group) const {
-    for (const auto& entry : table_)
-      if (entry.kind == kind && entry.group == group) return &entry;
-    return nullptr;
+  // The table is known to be in the one order that the format allows.
+  const layout::SectionEntry& find(layout::Kind kind, std::uint32_t group) const {
+    std::uint64_t i =
+        kind == layout::kFingerprint || kind == layout::kInfo ? 0 : layout::section_count(group);
+    while (table_[i].kind != kind) ++i;
+    return table_[i];
   }
 
   void check_header() {
@@ -127,25 +127,38 @@ class Reader {
   }
 
   void check_table() {
-    const std::uint64_t bytes = std::uint64_t{header_.section_count} * sizeof(layout::SectionEntry);
-    if (header_.section_count > layout::kMaxSections || sizeof(layout::Header) + bytes > file_->size())
+    const std::uint64_t count = layout::section_count(header_.group_count);
+    const std::uint64_t bytes = count * sizeof(layout::SectionEntry);
+    if (header_.section_count != count)
+      fail(ErrorCode::kDamaged, path_ + ": byte 24",
+           "{} sections for {} groups instead of {}; bake the cache again", header_.section_count,
+           header_.group_count, count);
+    if (sizeof(layout::Header) + bytes > file_->size())
       fail(ErrorCode::kDamaged, path_ + ": byte 24", "the section table does not fit; bake the cache again");
     const unsigned char* begin = file_->data() + sizeof(layout::Header);
     if (header_.table_checksum != XXH3_64bits(begin, bytes))
       fail(ErrorCode::kDamaged, path_ + ": byte 64", "the section table is damaged; bake the cache again");
-    table_.resize(header_.section_count);
-    if (bytes) std::memcpy(table_.data(), begin, bytes);
-    std::uint64_t expected = sizeof(layout::Header) + bytes;
+    table_.resize(count);
+    std::memcpy(table_.data(), begin, bytes);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const auto [kind, group] = layout::section_at(i);
+      if (table_[i].kind != kind || table_[i].group != group)
+        fail(ErrorCode::kDamaged,
+             fmt::format("{}: byte {}", path_, sizeof(layout::Header) + i * sizeof table_[i]),
+             "the table has section {} of group {} where {} of group {} belongs; bake the cache again",
+             name(table_[i].kind), table_[i].group, name(kind), group);
+    }
+    std::uint64_t expected = layout::align(sizeof(layout::Header) + bytes);
     for (const auto& entry : table_) {
-      expected = (expected + layout::kAlignment - 1) / layout::kAlignment * layout::kAlignment;
       if (expected > file_->size() || entry.offset != expected || entry.size > file_->size() - entry.offset)
         damaged(entry.kind, entry.group, "it is not where the format puts it");
       if (XXH3_64bits(file_->data() + entry.offset, entry.size) != entry.checksum)
         damaged(entry.kind, entry.group, "its checksum does not match");
-      expected = entry.offset + entry.size;
+      expected = layout::align(entry.offset + entry.size);
     }
-    if (header_.group_count > header_.section_count)
-      fail(ErrorCode::kDamaged, path_ + ": byte 28", "more groups than sections; bake the cache again");
+    if (expected != file_->size())
+      fail(ErrorCode::kDamaged, path_ + ": byte 16",
+           "the file does not end with its last section; bake the cache again");
   }
 
   [[noreturn]] void truncated(std::uint64_t wanted) const {
@@ -159,7 +172,7 @@ class Reader {
   std::vector<layout::SectionEntry> table_;
 };
 
-KeyValues read_key_values(const Reader& reader, std::array<char, 4> kind, std::uint32_t group) {
+KeyValues read_key_values(const Reader& reader, layout::Kind kind, std::uint32_t group) {
   const auto bytes = reader.section(kind, group);
   std::size_t at = 0;
   const auto read_u32 = [&]() -> std::uint32_t {
@@ -206,6 +219,14 @@ void check_planes(const Reader& reader, const CacheGroup& group, std::uint32_t i
       reader.damaged(kind, index,
                      signed_plane ? "a value is not finite" : "a value is negative or not finite");
   }
+  // Infinite power times a vanished profile would not be a number.
+  const auto areas = group.plane(Plane::kArea);
+  for (const Plane p : {Plane::kIrradianceR, Plane::kIrradianceG, Plane::kIrradianceB})
+    if (!all(group.plane(p), [&](const float& e) {
+          return std::isfinite(e * areas[static_cast<std::size_t>(&e - group.plane(p).data())]);
+        }))
+      reader.damaged(layout::kPlanes[static_cast<std::size_t>(p)], index,
+                     "irradiance times area is not finite");
 }
 
 // The breadth-first order makes each node's place in the tree known from the nodes before it, so one pass
@@ -258,16 +279,16 @@ void check_nodes(const Reader& reader, const CacheGroup& group, std::uint32_t in
 
 CacheGroup read_group(const Reader& reader, std::uint32_t index) {
   CacheGroup group;
-  for (const auto& [key, value] : read_key_values(reader, layout::kGroup, index)) {
-    if (key == "name") group.name = value;
-    if (key == "area") {
-      const auto [end, error] =
-          std::from_chars(value.data(), value.data() + value.size(), group.surface_area);
-      if (error != std::errc() || end != value.data() + value.size() || !std::isfinite(group.surface_area) ||
-          group.surface_area < 0)
-        reader.damaged(layout::kGroup, index, "the surface area is not a number");
-    }
-  }
+  KeyValues entries = read_key_values(reader, layout::kGroup, index);
+  if (entries.size() != 2 || entries[0].first != "name" || entries[1].first != "area")
+    reader.damaged(layout::kGroup, index, "it does not hold a name and an area");
+  group.name = std::move(entries[0].second);
+  const std::string& area = entries[1].second;
+  const char* end = area.data() + area.size();
+  const auto parsed = std::from_chars(area.data(), end, group.surface_area);
+  if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(group.surface_area) ||
+      group.surface_area < 0)
+    reader.damaged(layout::kGroup, index, "the surface area is not a number of 0 or more");
   for (std::size_t k = 0; k < kPlaneCount; ++k)
     group.planes[k] = reader.array<float>(layout::kPlanes[k], index);
   group.nodes = reader.array<OctreeNode>(layout::kNodes, index);
@@ -289,7 +310,7 @@ Cache load_cache(const std::string& path) {
 }
 
 bool is_cache_file(const std::string& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return false;
   std::array<unsigned char, 8> magic{};
   const bool read = ::read(descriptor, magic.data(), magic.size()) == static_cast<ssize_t>(magic.size());

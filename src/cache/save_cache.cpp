@@ -39,10 +39,6 @@ std::string encode(const KeyValues& entries) {
   return out;
 }
 
-std::uint64_t align(std::uint64_t offset) {
-  return (offset + layout::kAlignment - 1) / layout::kAlignment * layout::kAlignment;
-}
-
 }  // namespace
 
 void save_cache(const Cache& cache, const std::string& path) {
@@ -64,11 +60,12 @@ void save_cache(const Cache& cache, const std::string& path) {
   }
 
   std::vector<layout::SectionEntry> table;
-  std::uint64_t offset = align(sizeof(layout::Header) + sections.size() * sizeof(layout::SectionEntry));
+  std::uint64_t offset =
+      layout::align(sizeof(layout::Header) + sections.size() * sizeof(layout::SectionEntry));
   for (const Section& section : sections) {
     table.push_back(
         {section.kind, section.group, offset, section.size, XXH3_64bits(section.data, section.size)});
-    offset = align(offset + section.size);
+    offset = layout::align(offset + section.size);
   }
   layout::Header header{};
   header.magic = layout::kMagic;

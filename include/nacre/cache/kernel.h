@@ -13,8 +13,8 @@
 namespace nacre {
 
 /// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells.
-/// Linear interpolation within a cell is right to 3e-6 relative while sigma_tr r < 1, and to 1e-4 of the
-/// value at sigma_tr r = 15.
+/// Linear interpolation within a cell is right to 8e-6 relative while sigma_tr r < 1 (there R falls at most
+/// like r^-3), and to 1.5e-4 of the value up to sigma_tr r = 15; it never errs below.
 class Kernel {
  public:
   /// Radii of a disc within which it differs from a point.
@@ -31,7 +31,7 @@ class Kernel {
   /// profiles (R_d of the others hardly varies over a sample's share).
   Float4 eval_disc(float r2, float area) const noexcept;
   /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
-  static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * area / kPi; }
+  static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
   bool singular() const noexcept { return singular_; }
 
   /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), and of |R'|.

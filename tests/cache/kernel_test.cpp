@@ -1,0 +1,192 @@
+// label: analytic
+// The table against the closed form, its bounds against the derivatives, discs against integrals over them.
+#include "nacre/cache/kernel.h"
+
+#include <gtest/gtest.h>
+
+#include "cache/sample_sets.h"
+
+namespace nacre {
+namespace {
+
+using testing_support::make_material;
+
+struct Case {
+  const char* preset;
+  ProfileKind kind;
+};
+std::ostream& operator<<(std::ostream& out, const Case& c) {
+  return out << c.preset << " " << static_cast<int>(c.kind);
+}
+
+class EveryKernel : public testing::TestWithParam<Case> {
+ protected:
+  std::array<Profile, 3> profiles_ = make_profiles(make_material(GetParam().preset, GetParam().kind, 1));
+  Kernel kernel_{profiles_};
+
+  double start() const {
+    double narrowest = 1e30;
+    for (const Profile& p : profiles_) narrowest = std::min(narrowest, p.width);
+    return narrowest * (kernel_.singular() ? 0x1p-24 : 0x1p-10);
+  }
+  static double largest_sigma(const Profile& p) { return std::max(p.terms[0].sigma, p.terms[1].sigma); }
+};
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const char* preset : {"Marble", "Spectralon", "Skin1", "Ketchup"})
+    for (const auto kind : {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized})
+      all.push_back({preset, kind});
+  return all;
+}
+INSTANTIATE_TEST_SUITE_P(Materials, EveryKernel, testing::ValuesIn(cases()));
+
+// Distances from the start of the table to where 15 decay lengths or 1e5 widths are reached.
+TEST_P(EveryKernel, TableIsAsAccurateAsDocumented) {
+  Rng rng(1);
+  for (int k = 0; k < 3; ++k) {
+    const Profile& p = profiles_[static_cast<std::size_t>(k)];
+    const double sigma = largest_sigma(p);
+    const double end = sigma > 0 ? std::min(15 / sigma, 1e5 * p.width) : 1e5 * p.width;
+    double worst_near = 0, worst_far = 0;
+    for (int i = 0; i < 200000; ++i) {
+      const double r = start() * std::pow(end / start(), rng.next_double());
+      const auto r2 = static_cast<float>(r * r);
+      const double exact = eval_profile(p, std::sqrt(static_cast<double>(r2)));
+      const double error = std::abs(static_cast<double>(kernel_.eval(r2)[k]) / exact - 1);
+      double& worst = sigma * r < 1 ? worst_near : worst_far;
+      worst = std::max(worst, error);
+    }
+    EXPECT_LT(worst_near, 8e-6) << k;
+    EXPECT_LT(worst_far, 1.5e-4) << k;
+  }
+}
+
+TEST_P(EveryKernel, IsFiniteAndDecreasesFromCentreToBeyondTheEnd) {
+  for (int k = 0; k < 3; ++k) {
+    float previous = kernel_.eval(0)[k];
+    EXPECT_TRUE(std::isfinite(previous));
+    EXPECT_GT(previous, 0);
+    for (double r = 0.5 * start(); r < 1e15; r *= 1.013) {
+      const float value = kernel_.eval(static_cast<float>(r * r))[k];
+      ASSERT_TRUE(value >= 0 && value <= previous * (1 + 1e-6f)) << r << ": " << value << " " << previous;
+      previous = value;
+    }
+    EXPECT_EQ(kernel_.eval(std::numeric_limits<float>::infinity())[k], 0);
+    EXPECT_EQ(kernel_.eval(std::numeric_limits<float>::max())[k], 0);
+  }
+}
+
+TEST_P(EveryKernel, BoundsHoldEverywhereBeyondAndAreMonotone) {
+  Rng rng(2);
+  for (int k = 0; k < 3; ++k) {
+    const Profile& p = profiles_[static_cast<std::size_t>(k)];
+    const double first = kernel_.singular() ? start() : 0.01 * start();
+    for (int i = 0; i < 100000; ++i) {
+      const double near = first * std::pow(1e8, rng.next_double());
+      // Half of the time right at the cell, where the bound is tightest; else anywhere beyond.
+      const double r = i % 2 ? near : near * std::pow(1e4, rng.next_double());
+      const Kernel::Bounds& bounds = kernel_.bounds(static_cast<float>(near * near));
+      const ProfileValue v = eval_profile_derivatives(p, r * (1 + 1e-7));
+      // Below the least float the table says 0, and so may its bounds.
+      ASSERT_LE(std::abs(v.slope) * (1 - 1e-6) - 1e-45, static_cast<double>(bounds.slope[k]))
+          << near << " " << r;
+      ASSERT_LE(std::max(std::abs(v.curvature), std::abs(v.slope) / r) * (1 - 1e-6) - 1e-45,
+                static_cast<double>(bounds.hessian[k]))
+          << near << " " << r;
+    }
+    Kernel::Bounds previous = kernel_.bounds(0);
+    for (double r = 0.5 * start(); r < 1e10; r *= 1.01) {
+      const Kernel::Bounds& b = kernel_.bounds(static_cast<float>(r * r));
+      ASSERT_LE(b.slope[k], previous.slope[k]) << r;
+      ASSERT_LE(b.hessian[k], previous.hessian[k]) << r;
+      previous = b;
+    }
+  }
+}
+
+// The table is not that loose either: at worst the maximum of the next cell, 2 % above.
+TEST_P(EveryKernel, BoundsAreTightWhereTheProfileDecays) {
+  for (int k = 0; k < 3; ++k) {
+    const Profile& p = profiles_[static_cast<std::size_t>(k)];
+    // Where sigma r is larger, R falls by more than that within a cell.
+    for (double r = 3 * p.width; r < 30 * p.width && largest_sigma(p) * r < 5; r *= 1.1) {
+      const ProfileValue v = eval_profile_derivatives(p, r);
+      const double hessian = std::max(std::abs(v.curvature), std::abs(v.slope) / r);
+      const auto& bounds = kernel_.bounds(static_cast<float>(r * r));
+      EXPECT_LT(static_cast<double>(bounds.slope[k]), 1.6 * std::abs(v.slope)) << r;
+      EXPECT_LT(static_cast<double>(bounds.hessian[k]), 1.6 * hessian) << r;
+    }
+  }
+}
+
+// Mean over the disc in polar coordinates around the point x, which cancels the singularity: for each
+// direction the ray is inside the disc over one interval.
+double disc_mean(const Profile& p, double x, double radius) {
+  constexpr int kAngles = 720, kRadii = 400;
+  double sum = 0;
+  for (int a = 0; a < kAngles; ++a) {
+    const double phi = 2 * kPiD * (a + 0.5) / kAngles, along = -x * std::cos(phi);
+    const double root = radius * radius - square(x * std::sin(phi));
+    if (root <= 0) continue;
+    const double low = std::max(0.0, along - std::sqrt(root)), high = along + std::sqrt(root);
+    if (high <= low) continue;
+    for (int i = 0; i < kRadii; ++i) {
+      const double r = low + (high - low) * (i + 0.5) / kRadii;
+      sum += eval_profile(p, r) * r * (high - low) / kRadii;
+    }
+  }
+  return sum * (2 * kPiD / kAngles) / (kPiD * radius * radius);
+}
+
+TEST(SingularKernel, AveragesOverDiscs) {
+  for (const char* preset : {"Marble", "Spectralon", "Skin1"}) {
+    const auto profiles = make_profiles(make_material(preset, ProfileKind::kNormalized, 1));
+    const Kernel kernel(profiles);
+    ASSERT_TRUE(kernel.singular());
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double length = profiles[k].width;
+      for (const double disc : {0.01, 0.1, 0.34}) {
+        const double radius = disc * length;
+        const auto area = static_cast<float>(kPiD * radius * radius);
+        for (const double t : {0.0, 0.2, 0.5, 0.9, 1.0, 1.2, 2.0, 3.5, 4.5}) {
+          const double x = t * radius, exact = disc_mean(profiles[k], x, radius);
+          const auto value =
+              static_cast<double>(kernel.eval_disc(static_cast<float>(x * x), area)[static_cast<int>(k)]);
+          EXPECT_NEAR(value / exact, 1, 0.02) << preset << " " << k << " " << disc << " " << t;
+        }
+      }
+    }
+  }
+}
+
+TEST(SingularKernel, DiscsThatAreNoneArePoints) {
+  const Kernel kernel(make_profiles(make_material("Marble", ProfileKind::kNormalized, 1)));
+  for (const float area : {0.0f, 1e-45f, 1e-38f})
+    for (const float r2 : {0.0f, 1e-20f, 1.0f})
+      for (int k = 0; k < 3; ++k) EXPECT_EQ(kernel.eval_disc(r2, area)[k], kernel.eval(r2)[k]);
+  EXPECT_TRUE(std::isfinite(kernel.eval_disc(1, std::numeric_limits<float>::max())[0]));
+}
+
+TEST(RegularKernel, IsNotSingular) {
+  EXPECT_FALSE(Kernel(make_profiles(make_material("Marble", ProfileKind::kDipole, 1))).singular());
+}
+
+// Channels that do not scatter have no profile; all of them black is a kernel as well.
+TEST(Kernel, OfNothingIsZero) {
+  const Kernel kernel({Profile{}, Profile{}, Profile{}});
+  for (const float r2 : {0.0f, 1e-9f, 1.0f, 1e9f})
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_EQ(kernel.eval(r2)[k], 0);
+      EXPECT_EQ(kernel.bounds(r2).slope[k], 0);
+    }
+}
+
+TEST(Kernel, KeepsABlackChannelBlackBesideOthers) {
+  const Kernel kernel({make_dipole(2, 0.01, 1.5), Profile{}, make_dipole(2, 0.01, 1.5)});
+  EXPECT_GT(kernel.eval(1)[0], 0);
+  EXPECT_EQ(kernel.eval(1)[1], 0);
+  EXPECT_EQ(kernel.eval(1)[0], kernel.eval(1)[2]);
+}
+
+}  // namespace
+}  // namespace nacre
