@@ -13,9 +13,15 @@ using namespace testing_support;
 
 constexpr ProfileKind kKinds[] = {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized};
 
+std::vector<Rgb> eval(const Exitance& exitance, std::span<const Vec3> points, std::uint64_t& evaluations) {
+  std::vector<Rgb> values(points.size());
+  exitance.eval(points, values, evaluations);
+  return values;
+}
+
 Rgb eval(const Exitance& exitance, const Vec3& x) {
   std::uint64_t evaluations = 0;
-  return exitance.eval(x, evaluations);
+  return eval(exitance, {&x, 1}, evaluations)[0];
 }
 
 // The sum that M_o is, in double precision from the closed forms. Singular profiles are averaged over a
@@ -90,7 +96,9 @@ TEST_P(EveryKind, ZeroToleranceIsTheExactSumBitForBit) {
     for (int i = 0; i < 50; ++i) {
       const Vec3 x = shape.point(rng);
       std::uint64_t a = 0, b = 0;
-      const Rgb m = exitance.eval(x, a), exact = exitance.eval_exact(x, b);
+      const Rgb m = eval(exitance, {&x, 1}, a)[0];
+      Rgb exact;
+      exitance.eval_exact({&x, 1}, {&exact, 1}, b);
       EXPECT_EQ(m, exact);
       EXPECT_EQ(a, owned.group.size());
       EXPECT_EQ(b, owned.group.size());
@@ -142,8 +150,9 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
             const Exitance fast(owned.group, medium, tolerance);
             double error[3]{};
             std::uint64_t evaluations = 0;
+            const std::vector<Rgb> values = eval(fast, points, evaluations);
             for (std::size_t i = 0; i < points.size(); ++i) {
-              const Rgb m = fast.eval(points[i], evaluations);
+              const Rgb m = values[i];
               for (int k = 0; k < 3; ++k) {
                 ASSERT_TRUE(std::isfinite(m[k]) && m[k] >= 0);
                 error[k] += square(static_cast<double>(m[k]) - static_cast<double>(expected[i][k]));
@@ -160,6 +169,23 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
           }
         }
       }
+}
+
+// A point's value depends neither on the points it is evaluated with nor on their order.
+TEST_P(EveryKind, ValuesDoNotDependOnCompany) {
+  const OwnedGroup owned = make_group(kShapes[0].make(40, &side_light));
+  const Exitance exitance(owned.group, make_material("Marble", GetParam(), 20), 0.01);
+  Rng rng(6);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 300; ++i) points.push_back(kShapes[0].point(rng));
+  std::uint64_t evaluations = 0;
+  const std::vector<Rgb> together = eval(exitance, points, evaluations);
+  const std::vector<Vec3> reversed(points.rbegin(), points.rend());
+  const std::vector<Rgb> backwards = eval(exitance, reversed, evaluations);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(together[i], eval(exitance, points[i]));
+    EXPECT_EQ(together[i], backwards[points.size() - 1 - i]);
+  }
 }
 
 // The radial integral of R over the plane is the profile's total; a finite disc misses the tail. Dipoles
