@@ -50,34 +50,25 @@ Ray CameraRays::at(const Vec2& pixel) const noexcept {
 
 FilterSampler::FilterSampler(const Film& film) : radius_(film.filter_radius) {
   if (film.filter == FilterKind::kBox) return;
-  // Cumulative weights of a Gaussian that is shifted to reach zero at its radius, then inverted at equal
-  // steps.
-  constexpr int kSteps = 4096, kEntries = 1024;
+  // A Gaussian that is shifted to reach zero at its radius, in steps so short that its weight hardly changes
+  // within one.
+  constexpr std::size_t kSteps = 4096;
   const double sigma = film.filter_stddev, radius = radius_;
-  const double floor = std::exp(-radius * radius / (2 * sigma * sigma));
-  std::vector<double> cumulative(kSteps + 1, 0.0);
-  for (int i = 0; i < kSteps; ++i) {
-    const double x = radius * (2 * (i + 0.5) / kSteps - 1);
-    cumulative[static_cast<std::size_t>(i) + 1] =
-        cumulative[static_cast<std::size_t>(i)] +
-        std::max(0.0, std::exp(-x * x / (2 * sigma * sigma)) - floor);
+  const auto gaussian = [&](double x) { return std::exp(-x * x / (2 * sigma * sigma)); };
+  std::vector<double> weights(kSteps);
+  for (std::size_t i = 0; i < kSteps; ++i) {
+    const double x = radius * (2 * (static_cast<double>(i) + 0.5) / kSteps - 1);
+    weights[i] = std::max(0.0, gaussian(x) - gaussian(radius));
   }
-  inverse_.resize(kEntries + 1);
-  std::size_t step = 0;
-  for (std::size_t e = 0; e <= kEntries; ++e) {
-    const double wanted = cumulative.back() * static_cast<double>(e) / kEntries;
-    while (step + 1 < kSteps && cumulative[step + 1] < wanted) ++step;
-    const double width = cumulative[step + 1] - cumulative[step];
-    const double fraction = width > 0 ? std::clamp((wanted - cumulative[step]) / width, 0.0, 1.0) : 0.0;
-    inverse_[e] = static_cast<float>(radius * (2 * (static_cast<double>(step) + fraction) / kSteps - 1));
-  }
+  steps_ = Distribution(weights);
 }
 
 float FilterSampler::sample_axis(float u) const noexcept {
-  if (inverse_.empty()) return radius_ * (2 * u - 1);
-  const float x = u * static_cast<float>(inverse_.size() - 1);
-  const auto cell = std::min(static_cast<std::size_t>(x), inverse_.size() - 2);
-  return inverse_[cell] + (x - static_cast<float>(cell)) * (inverse_[cell + 1] - inverse_[cell]);
+  if (!(steps_.total() > 0)) return radius_ * (2 * u - 1);
+  double within = u;
+  const std::size_t step = steps_.sample(within);
+  const double x = (static_cast<double>(step) + within) / static_cast<double>(steps_.size());
+  return static_cast<float>(radius_ * (2 * x - 1));
 }
 
 }  // namespace nacre

@@ -1,6 +1,7 @@
 // Camera rays and reconstruction filters.
 #pragma once
 
+#include "nacre/base/sampling.h"
 #include "nacre/geometry/ray_tracer.h"
 #include "nacre/scene/scene.h"
 
@@ -29,7 +30,7 @@ class FilterSampler {
  private:
   float sample_axis(float u) const noexcept;
   float radius_;
-  std::vector<float> inverse_;  // offsets at equally spaced u; empty for a box
+  Distribution steps_;  // weights of short steps from -radius to radius; empty for a box
 };
 
 }  // namespace nacre
