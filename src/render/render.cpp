@@ -16,6 +16,9 @@ namespace {
 
 // Longest chain of mirror reflections and refractions.
 constexpr int kMaxWaves = 12;
+// Bounces at which both ways through glass are followed, and the share of a pixel below which a way is not.
+constexpr int kSplitWaves = 4;
+constexpr float kLeastThroughput = 1e-4f;
 constexpr std::size_t kPathsPerTask = 1 << 15;
 
 // A ray on its way, what it is worth and which layer it adds to.
@@ -26,6 +29,7 @@ struct Path {
   std::uint32_t sample;  // of the pixel
   Layer layer;
   Hit hit;
+  std::uint32_t branch = 1;  // which of the ways through glass this one is
 };
 
 // Seconds of all threads per stage, and counts.
@@ -224,23 +228,32 @@ class PixelLoop {
     Path child = path;
     if (translucent && wave == 0) child.layer = Layer::kSpecular;
 
-    // Glass goes one way or the other, chosen by its reflectance; everything else only reflects.
-    Rng rng(hash_words(pixel_key(path.pixel, 100 + static_cast<std::uint64_t>(wave)), path.sample));
-    if (bsdf.transmits && rng.next_float() >= reflectance) {
-      Vec3 transmitted;
-      if (!refract(out, point.shading_normal * side, eta, transmitted)) return;
-      child.throughput *= bsdf.specular_transmittance;
-      child.ray = {point.origin(-side), transmitted.normalized()};
-    } else {
-      child.throughput *= bsdf.specular_reflectance * (bsdf.transmits ? 1.0f : reflectance);
-      Vec3 direction = reflect(out, point.shading_normal * side).normalized();
-      // An interpolated normal can mirror the ray into the surface; the plane of the triangle is the limit.
-      const float below = dot(direction, point.geometric_normal) * side;
-      if (below <= 0)
-        direction = (direction - point.geometric_normal * (side * (below - 1e-3f))).normalized();
-      child.ray = {point.origin(side), direction};
+    // Glass sends light both ways, first along both of them, deeper down along one that is chosen by its
+    // reflectance; everything else only reflects.
+    float reflected = reflectance, refracted = bsdf.transmits ? 1 - reflectance : 0.0f;
+    if (bsdf.transmits && wave >= kSplitWaves) {
+      Rng rng(hash_words(pixel_key(path.pixel, 100 + static_cast<std::uint64_t>(wave)), path.sample,
+                         path.branch));
+      const bool reflects = rng.next_float() < reflectance;
+      reflected = reflects ? 1.0f : 0.0f;
+      refracted = 1 - reflected;
     }
-    if (max_channel(child.throughput) > 1e-4f) next.push_back(child);
+    Vec3 transmitted;
+    if (refracted > 0 && refract(out, point.shading_normal * side, eta, transmitted)) {
+      Path through = child;
+      through.branch = 2 * path.branch + 1;
+      through.throughput *= bsdf.specular_transmittance * refracted;
+      through.ray = {point.origin(-side), transmitted.normalized()};
+      if (max_channel(through.throughput) > kLeastThroughput) next.push_back(through);
+    }
+    child.branch = 2 * path.branch;
+    child.throughput *= bsdf.specular_reflectance * reflected;
+    Vec3 direction = reflect(out, point.shading_normal * side).normalized();
+    // An interpolated normal can mirror the ray into the surface; the plane of the triangle is the limit.
+    const float below = dot(direction, point.geometric_normal) * side;
+    if (below <= 0) direction = (direction - point.geometric_normal * (side * (below - 1e-3f))).normalized();
+    child.ray = {point.origin(side), direction};
+    if (max_channel(child.throughput) > kLeastThroughput) next.push_back(child);
   }
 
   const World& world_;
