@@ -14,7 +14,7 @@ struct Options {
 
 void run(const Options& options, const std::string& command_line) {
   Session session(options.common, command_line);
-  check_writable(options.output);
+  check_writable(options.output, {options.scene.path});
   const Scene scene = load_scene(options.scene, session);
   const BakeParams params = options.bake.params(options.common);
   plan_bake(scene, params);  // refuses absurd sizes before anything is built

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "nacre/base/file.h"
@@ -149,7 +150,13 @@ Cache run_bake(const World& world, const BakeParams& params, Session& session) {
   return bake(world, plan, params, session.progress(), session.report());
 }
 
-void check_writable(const std::string& path) { const AtomicFile probe(path); }
+void check_writable(const std::string& path, const std::vector<std::string>& inputs) {
+  std::error_code ignored;
+  for (const std::string& input : inputs)
+    if (!input.empty() && std::filesystem::equivalent(path, input, ignored))
+      throw UsageError(path + " is what this command reads; give another output file");
+  const AtomicFile probe(path);
+}
 
 std::array<int, 2> parse_size(const std::string& text, const std::string& option) {
   std::array<int, 2> size{};

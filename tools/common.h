@@ -73,8 +73,9 @@ void add_bake_options(CLI::App& command, BakeOptions& options);
 /// Plans, announces and runs a bake.
 Cache run_bake(const World& world, const BakeParams& params, Session& session);
 
-/// Fails early, before any work, if a file cannot be created there.
-void check_writable(const std::string& path);
+/// Fails early, before any work, if a file cannot be created there or if it would replace one of the
+/// `inputs`.
+void check_writable(const std::string& path, const std::vector<std::string>& inputs = {});
 /// "640x480" to two positive numbers; `option` names the culprit.
 std::array<int, 2> parse_size(const std::string& text, const std::string& option);
 /// "12 MB" and the like.

@@ -136,8 +136,13 @@ void run(const Options& options, const std::string& command_line) {
   const std::optional<double> exposure = parse_exposure(options.exposure);
   const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
   Session session(options.common, command_line);
-  check_writable(options.output);
-  if (options.png) check_writable(preview);
+  const std::vector<std::string> inputs{options.scene.path, options.cache};
+  check_writable(options.output, inputs);
+  if (options.png) {
+    if (preview == options.output)
+      throw UsageError("-o " + options.output + ": --png writes there; name the picture .exr");
+    check_writable(preview, inputs);
+  }
 
   const Scene scene = load_scene(options.scene, session);
   const RenderParams params = make_params(options, scene);

@@ -87,6 +87,8 @@ TEST_F(Errors, AbsurdScale) {
 
 TEST_F(Errors, Usage) {
   expect_refusal("render s.xml", 2, "--output");
+  expect_refusal("bake s.xml -o ./s.xml", 2, "reads");
+  expect_refusal("render s.xml -o a.png --png", 2, "a.png");
   expect_refusal("render s.xml -o a.exr --size big", 2, "--size big");
   expect_refusal("render s.xml -o a.exr --crop 60,40,20x20", 2, "outside");
   expect_refusal("render s.xml -o a.exr --crop nonsense", 2, "--crop nonsense");
