@@ -19,7 +19,7 @@ namespace nacre::tools {
 namespace {
 
 ProgressStyle progress_style(bool quiet) {
-  if (quiet) return ProgressStyle::kNone;
+  if (quiet) return ProgressStyle::kSilent;
   return ::isatty(STDERR_FILENO) ? ProgressStyle::kBar : ProgressStyle::kLines;
 }
 

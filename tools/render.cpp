@@ -20,8 +20,13 @@ struct Options {
   std::string output, cache, camera, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
   int samples_per_pixel = 0;
   double tolerance = 0.01;
+  std::optional<int> single_samples, mc_samples;
+  std::optional<std::string> mc_sampling;
   bool png = false;
 };
+
+// In the order of Method.
+const std::vector<std::string> kMethods{"hierarchical", "exact", "montecarlo", "lambert"};
 
 AovSelection parse_aovs(const std::string& text) {
   if (text == "all") return {};
@@ -81,8 +86,13 @@ RenderParams make_params(const Options& options, const Scene& scene) {
   if (std::int64_t{params.crop_width} * params.crop_height > (std::int64_t{1} << 28))
     throw UsageError("the picture has more than 2^28 pixels; render it in parts with --crop");
   if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
-  params.method = options.method == "exact" ? Method::kExact : Method::kHierarchical;
+  params.method =
+      static_cast<Method>(std::find(kMethods.begin(), kMethods.end(), options.method) - kMethods.begin());
   params.tolerance = options.tolerance;
+  if (options.single_samples) params.single_samples = *options.single_samples;
+  if (options.mc_samples) params.mc_samples = *options.mc_samples;
+  if (options.mc_sampling == "uniform") params.mc_sampling = MonteCarloSampling::kUniform;
+  params.bounces = options.bake.bounces;
   params.seed = options.common.seed;
   params.aovs = parse_aovs(options.aovs);
   return params;
@@ -129,10 +139,55 @@ std::optional<double> parse_exposure(const std::string& text) {
   return value;
 }
 
-void run(const Options& options, const std::string& command_line) {
+// Options that have nothing to act on are mistakes.
+void check_combination(const Options& options, bool cached) {
   if (!options.cache.empty() && options.bake.any_but_shadows())
     throw UsageError(
         "--points, --spacing, --irradiance-samples and --bounces are for baking; --cache is baked already");
+  const bool samples_cache = options.bake.points || options.bake.spacing || options.bake.irradiance_samples;
+  if (!cached && (!options.cache.empty() || samples_cache))
+    throw UsageError(
+        fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing and "
+                    "--irradiance-samples",
+                    options.method));
+  if ((options.mc_samples || options.mc_sampling) && options.method != "montecarlo")
+    throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
+  if (options.single_samples && options.method == "lambert")
+    throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
+}
+
+// Media that hold all orders of scattering already, where single scattering was asked for.
+Warnings check_single_scattering(const Scene& scene, const Options& options) {
+  Warnings warnings;
+  for (std::size_t m = 0; m < scene.media.size(); ++m)
+    if (options.single_samples.value_or(0) > 0 && scene.media[m].profile == ProfileKind::kNormalized)
+      warnings.push_back(
+          fmt::format("{}: the profile of medium {} contains single scattering: --single-samples "
+                      "has no effect on it",
+                      scene.media[m].place, medium_name(scene, m)));
+  return warnings;
+}
+
+// What the picture is made from where a cache is used, else an empty one that still says what it would have
+// depended on.
+Cache make_cache(const Options& options, const RenderParams& params, const World& world,
+                 const BakeParams& bake_params, Session& session) {
+  const Scene& scene = *world.scene;
+  if (scene.media.empty()) return {};
+  if (!options.cache.empty())
+    return load_matching_cache(options.cache, scene, bake_params.shadows, session.report());
+  if (uses_cache(params.method)) return run_bake(world, bake_params, session);
+  std::vector<int> bounces;
+  for (std::size_t m = 0; m < scene.media.size(); ++m)
+    bounces.push_back(irradiance_bounces(scene, m, params.bounces));
+  Cache cache;
+  cache.fingerprint = make_fingerprint(scene, bounces, bake_params.shadows);
+  return cache;
+}
+
+void run(const Options& options, const std::string& command_line) {
+  const bool cached = options.method == "hierarchical" || options.method == "exact";
+  check_combination(options, cached);
   const std::optional<double> exposure = parse_exposure(options.exposure);
   const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
   Session session(options.common, command_line);
@@ -147,18 +202,18 @@ void run(const Options& options, const std::string& command_line) {
   const Scene scene = load_scene(options.scene, session);
   const RenderParams params = make_params(options, scene);
   const BakeParams bake_params = options.bake.params(options.common);
-  if (options.cache.empty() && !scene.media.empty()) plan_bake(scene, bake_params);
+  session.warn(check_single_scattering(scene, options));
+  if (cached && options.cache.empty() && !scene.media.empty()) plan_bake(scene, bake_params);
   const World world = [&] {
     const StageTimer timer(session.report(), "build_bvh");
     return make_world(scene, bake_params.shadows);
   }();
-  const Cache cache = scene.media.empty() ? Cache{}
-                      : options.cache.empty()
-                          ? run_bake(world, bake_params, session)
-                          : load_matching_cache(options.cache, scene, bake_params.shadows, session.report());
-  session.warn(check_density(scene, cache));
+  const Cache cache = make_cache(options, params, world, bake_params, session);
+  if (cached) session.warn(check_density(scene, cache));
 
-  Image image = render(world, cache, params, session.progress(), session.report());
+  Warnings warnings;
+  Image image = render(world, cache, params, session.progress(), session.report(), warnings);
+  session.warn(warnings);
   image.metadata = {{"nacre:version", kVersion},
                     {"nacre:command", command_line},
                     {"nacre:seed", fmt::format("{}", options.common.seed)},
@@ -185,12 +240,28 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
   command->add_option("--crop", options->crop, "X,Y,WIDTHxHEIGHT: render this part of the picture only");
   command->add_option("--spp", options->samples_per_pixel, "Samples per pixel (default: the sampler's)")
       ->check(CLI::Range(1, 1 << 16));
-  command->add_option("--method", options->method, "How diffusion is summed: hierarchical (default) or exact")
-      ->check(CLI::IsMember({"hierarchical", "exact"}));
+  command
+      ->add_option(
+          "--method", options->method,
+          "Diffusion: hierarchical (default) or exact sum over the cache, montecarlo without one, or "
+          "lambert, its approximation as an opaque surface")
+      ->check(CLI::IsMember(kMethods));
   command
       ->add_option("--tolerance", options->tolerance,
                    "Relative error of the hierarchical sum (default: 0.01)")
       ->check(CLI::Range(0.0, 1.0));
+  command
+      ->add_option("--single-samples", options->single_samples,
+                   "Points of single scattering per camera sample (default: 1; 0: none)")
+      ->check(CLI::Range(0, 1 << 16));
+  command
+      ->add_option("--mc-samples", options->mc_samples,
+                   "Surface points per camera sample of --method montecarlo (default: 64)")
+      ->check(CLI::Range(1, 1 << 16));
+  command
+      ->add_option("--mc-sampling", options->mc_sampling,
+                   "How they are chosen: by distance (exponential, default) or by area (uniform)")
+      ->check(CLI::IsMember({"uniform", "exponential"}));
   command->add_option("--aov", options->aovs,
                       "none, all (default), or a list of layers, position, normal, depth, object");
   command->add_flag("--png", options->png, "Write an sRGB preview beside the OpenEXR file");

@@ -92,7 +92,7 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     if (!params.spacing_mm) group.points *= settings.sample_multiplier;
     group.irradiance_samples = params.irradiance_samples.value_or(
         settings.irradiance_samples > 0 ? settings.irradiance_samples : kDefaultIrradianceSamples);
-    group.bounces = params.bounces.value_or(settings.indirect ? scene.integrator.bounces() : 0);
+    group.bounces = irradiance_bounces(scene, m, params.bounces);
     plan.groups.push_back(group);
   }
   if (plan.groups.empty())

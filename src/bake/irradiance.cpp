@@ -1,49 +1,11 @@
 // Transmitted irradiance at samples.
+#include "nacre/transport/irradiance.h"
+
 #include "nacre/bake/bake.h"
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
-#include "nacre/optics/fresnel.h"
-#include "nacre/transport/light.h"
 
 namespace nacre {
-namespace {
-
-struct Receiver {
-  Vec3 position, normal, origin;  // origin: just off the surface
-  float eta;
-};
-
-Rgb direct_irradiance(const World& world, const Receiver& at, int samples, std::uint64_t key) {
-  Rgb sum(0, 0, 0);
-  for (std::size_t light = 0; light < world.scene->lights.size(); ++light) {
-    const int count = std::holds_alternative<AreaLight>(world.scene->lights[light].model) ? samples : 1;
-    Rgb of_light(0, 0, 0);
-    for (int s = 0; s < count; ++s) {
-      const Vec2 u = sobol_2d(static_cast<std::uint32_t>(s), hash_words(key, light));
-      const LightSample sample = sample_light(world, light, at.position, u);
-      const float cosine = dot(sample.direction, at.normal);
-      if (cosine <= 0 || is_black(sample.irradiance) || !is_visible(world, at.origin, sample)) continue;
-      of_light += sample.irradiance * (cosine * (1 - fresnel_reflectance(cosine, at.eta)));
-    }
-    sum += of_light / static_cast<float>(count);
-  }
-  return sum;
-}
-
-Rgb bounced_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key) {
-  const Frame frame = make_frame(at.normal);
-  Rgb sum(0, 0, 0);
-  for (int s = 0; s < samples; ++s) {
-    const Vec3 local = sample_cosine_hemisphere(sobol_2d(static_cast<std::uint32_t>(s), key));
-    if (local.z <= 0) continue;
-    const Rgb radiance = trace_bounced_light(world, {at.origin, frame.to_world(local)}, bounces,
-                                             hash_words(key, static_cast<std::uint64_t>(s), 1));
-    sum += radiance * (kPi * (1 - fresnel_reflectance(local.z, at.eta)));
-  }
-  return sum / static_cast<float>(samples);
-}
-
-}  // namespace
 
 std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
                                     int bounces, std::uint64_t seed, Progress& progress) {
@@ -54,9 +16,7 @@ std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& po
       const Vec3& normal = points.normals[i];
       const Receiver at{points.positions[i], normal,
                         offset_from_surface(points.positions[i], normal, points.extents[i]), eta};
-      irradiance[i] = direct_irradiance(world, at, samples, hash_words(seed, i, 0));
-      if (bounces > 0)
-        irradiance[i] += bounced_irradiance(world, at, samples, bounces, hash_words(seed, i, 1));
+      irradiance[i] = estimate_irradiance(world, at, samples, bounces, hash_words(seed, i));
     }
     progress.advance(end - begin);
   });

@@ -19,16 +19,38 @@ namespace {
   fail(ErrorCode::kIo, path, "cannot {}: {}", action, std::strerror(error));
 }
 
+// Where a chain of symbolic links leads, so that renaming replaces the file and not the link to it. A circle
+// ends somewhere in it, and opening that fails.
+std::string follow_links(const std::string& path) {
+  std::filesystem::path at = path;
+  std::error_code error;
+  for (int link = 0; link < 40; ++link) {
+    const auto target = std::filesystem::read_symlink(at, error);
+    if (error) break;
+    at = at.parent_path() / target;
+  }
+  return at.string();
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
+AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follow_links(path_)) {
   static std::atomic<unsigned> serial{0};
   struct stat status;
-  if (::stat(path_.c_str(), &status) == 0 && S_ISDIR(status.st_mode)) {
-    errno = EISDIR;
-    fail_io(path_, "write");
+  if (::stat(target_.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) {
+      errno = EISDIR;
+      fail_io(path_, "write");
+    }
+    if (S_ISCHR(status.st_mode)) {
+      descriptor_ = ::open(target_.c_str(), O_RDWR | O_CLOEXEC | O_NOCTTY);
+      if (descriptor_ < 0) fail_io(path_, "write");
+      return;
+    }
+    if (!S_ISREG(status.st_mode))
+      fail(ErrorCode::kIo, path_, "cannot write: it is not a regular file; give the name of one");
   }
-  temporary_ = fmt::format("{}.tmp-{}-{}", path_, ::getpid(), serial++);
+  temporary_ = fmt::format("{}.tmp-{}-{}", target_, ::getpid(), serial++);
   descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor_ < 0) fail_io(path_, "write");
 }
@@ -50,15 +72,17 @@ void AtomicFile::write(const void* data, std::size_t bytes) {
 }
 
 void AtomicFile::commit() {
-  if (::fsync(descriptor_) != 0) fail_io(path_, "write");
+  const bool device = temporary_.empty();
+  if (!device && ::fsync(descriptor_) != 0) fail_io(path_, "write");
   const int descriptor = descriptor_;
   descriptor_ = -1;
   if (::close(descriptor) != 0) fail_io(path_, "write");
-  if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail_io(path_, "write");
+  if (device) return;
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail_io(path_, "write");
   temporary_.clear();
   // The rename itself has to reach the disk too; a file system that cannot sync a folder is no reason to
   // fail.
-  const auto folder = std::filesystem::path(path_).parent_path();
+  const auto folder = std::filesystem::path(target_).parent_path();
   const int folder_descriptor =
       ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder_descriptor >= 0) {

@@ -69,6 +69,13 @@ Vec3 to_unit_normal(const Vec3d& sum, const Vec3d& fallback) {
 
 }  // namespace
 
+std::vector<double> triangle_areas(const Mesh& mesh) {
+  std::vector<double> areas;
+  areas.reserve(mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) areas.push_back(0.5 * area_vector_double(mesh, t).length());
+  return areas;
+}
+
 double surface_area(const Mesh& mesh) {
   double sum = 0;
   for (const Triangle& t : mesh.triangles) sum += area_vector_double(mesh, t).length();

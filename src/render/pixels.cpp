@@ -30,11 +30,13 @@ Image PixelBuffer::make_image(const RenderParams& params) const {
   };
   const char* const kRgbNames[] = {"R", "G", "B"};
   const char* const kXyzNames[] = {"X", "Y", "Z"};
-  const char* const kLayerNames[kLayerCount] = {"diffusion", "specular", "surface"};
+  const char* const kLayerNames[kLayerCount] = {"diffusion", "single", "specular", "surface"};
   // Beauty is the sum of the stored layers, rounded as a reader of the file would do it: from left to right.
   for (int k = 0; k < 3; ++k)
     add(kRgbNames[k], [&](std::size_t i) {
-      return layers[0][i][k] * scale + layers[1][i][k] * scale + layers[2][i][k] * scale;
+      float sum = layers[0][i][k] * scale;
+      for (std::size_t l = 1; l < kLayerCount; ++l) sum += layers[l][i][k] * scale;
+      return sum;
     });
   add("A", [&](std::size_t i) { return coverage[i] * scale; });
   if (params.aovs.layers)

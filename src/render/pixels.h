@@ -9,8 +9,8 @@
 
 namespace nacre {
 
-enum class Layer : std::uint8_t { kDiffusion, kSpecular, kSurface };
-inline constexpr std::size_t kLayerCount = 3;
+enum class Layer : std::uint8_t { kDiffusion, kSingle, kSpecular, kSurface };
+inline constexpr std::size_t kLayerCount = 4;
 
 struct PixelBuffer {
   PixelBuffer(int buffer_width, int buffer_height);

@@ -77,6 +77,7 @@ MediumElement read_medium(const XmlElement& element, Warnings& warnings) {
   medium.profile =
       static_cast<ProfileKind>(parameters.choice("profile", {"dipole", "betterdipole", "normalized"}));
   medium.convention = static_cast<Convention>(parameters.choice("convention", {"published", "conserving"}));
+  medium.lambert = parameters.boolean("lambert", false);
 
   SubsurfaceSettings& settings = result.settings;
   settings.irradiance_samples = parameters.integer("irrSamples", 0, 0, 1'000'000);

@@ -8,6 +8,10 @@ int Integrator::bounces() const {
   return max_depth < 0 ? kUnlimitedBounces : std::max(0, max_depth - 2);
 }
 
+int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int> asked) {
+  return asked.value_or(scene.subsurface[medium].indirect ? scene.integrator.bounces() : 0);
+}
+
 std::string light_name(const Scene& scene, std::size_t light) {
   const std::string& id = scene.lights[light].id;
   return id.empty() ? fmt::format("light {}", light + 1) : id;

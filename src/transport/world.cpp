@@ -1,6 +1,8 @@
 // Preparing a scene.
 #include "nacre/transport/world.h"
 
+#include "nacre/optics/fresnel.h"
+
 namespace nacre {
 
 World make_world(const Scene& scene, bool shadows) {
@@ -14,11 +16,7 @@ World make_world(const Scene& scene, bool shadows) {
   for (const Light& light : scene.lights) {
     Distribution triangles;
     if (const auto* area = std::get_if<AreaLight>(&light.model)) {
-      const Mesh& mesh = scene.shapes[area->shape].mesh;
-      std::vector<double> areas(mesh.triangles.size());
-      for (std::size_t t = 0; t < areas.size(); ++t)
-        areas[t] = 0.5 * static_cast<double>(area_vector(mesh, t).length());
-      triangles = Distribution(areas);
+      triangles = Distribution(triangle_areas(scene.shapes[area->shape].mesh));
       if (!(triangles.total() > 0))
         fail(ErrorCode::kValue, light.place, "this light's shape has no area; remove it");
     }
@@ -33,6 +31,17 @@ SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {
                      triangle_extent(mesh, hit.triangle), shading_normal(mesh, hit)};
   if (dot(point.shading_normal, point.geometric_normal) < 0) point.shading_normal = -point.shading_normal;
   return point;
+}
+
+Vec3 SurfacePoint::normal_towards(const Vec3& direction) const noexcept {
+  constexpr float kGrazing = 1e-3f;  // sine of the least angle between the image and the plane
+  const Vec3 plane = geometric_normal * side(direction);
+  const Vec3 normal = shading_normal * side(direction);
+  const Vec3 image = reflect(direction, normal);
+  const float above = dot(image, plane);
+  if (above >= kGrazing) return normal;
+  // Halfway between the direction and the lifted image.
+  return (direction + (image + plane * (kGrazing - above)).normalized()).normalized();
 }
 
 }  // namespace nacre

@@ -40,6 +40,7 @@ TEST(Bunny, DefaultToleranceIsWithinOnePercentOfExact) {
   const World world = make_world(scene, true);
   Progress progress;
   Report report;
+  Warnings warnings;
   BakeParams bake_params;
   bake_params.irradiance_samples = 8;
   const Cache cache = bake(world, plan_bake(scene, bake_params), bake_params, progress, report);
@@ -48,10 +49,10 @@ TEST(Bunny, DefaultToleranceIsWithinOnePercentOfExact) {
   RenderParams params = default_render_params(scene, 0);
   params.width = params.height = params.crop_width = params.crop_height = 80;
   params.samples_per_pixel = 1;
-  const Image fast = render(world, cache, params, progress, report);
+  const Image fast = render(world, cache, params, progress, report, warnings);
   const std::uint64_t evaluations = report.counts["kernel_evaluations"];
   params.method = Method::kExact;
-  const Image exact = render(world, cache, params, progress, report);
+  const Image exact = render(world, cache, params, progress, report, warnings);
   const ImageDifference difference = compare_images(fast, exact, "diffusion");
   EXPECT_LE(difference.relative_rmse, 0.01);
   EXPECT_GT(difference.relative_rmse, 0);  // else the fast way was not taken

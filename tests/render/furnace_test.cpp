@@ -59,6 +59,7 @@ Means render_means(const Scene& scene, int irradiance_samples, double spacing_mm
   const World world = make_world(scene, true);
   Progress progress;
   Report report;
+  Warnings warnings;
   Cache cache;
   if (!scene.media.empty()) {
     BakeParams params;
@@ -68,7 +69,8 @@ Means render_means(const Scene& scene, int irradiance_samples, double spacing_mm
   }
   RenderParams params = default_render_params(scene, 0);
   params.method = Method::kExact;  // what is tested is everything but the tolerance
-  const Image image = render(world, cache, params, progress, report);
+  params.single_samples = 0;       // the profiles' totals are those of diffusion alone
+  const Image image = render(world, cache, params, progress, report, warnings);
   const auto mean = [&](const std::string& prefix) {
     Rgb result;
     const char* const names[] = {"R", "G", "B"};

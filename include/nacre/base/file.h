@@ -8,16 +8,18 @@
 namespace nacre {
 
 /// A file being written under a temporary name beside its final one. commit() syncs and renames it; without
-/// commit() the destructor removes it, so that an error or an exception leaves nothing behind.
+/// commit() the destructor removes it, so that an error or an exception leaves nothing behind. A symbolic
+/// link stays one: what it points to is replaced. A device such as /dev/null is written to as it is.
 class AtomicFile {
  public:
   /// Creates `path`.tmp-<pid>-<n>. Throws Error(kIo, path) if the folder is missing or not writable, or
-  /// `path` is a folder.
+  /// `path` is a folder, a pipe or a socket.
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
+  /// Empty for a device.
   const std::string& temporary_path() const noexcept { return temporary_; }
   int descriptor() const noexcept { return descriptor_; }
   /// Writes all bytes. Throws Error(kIo, path) with the system's reason (disk full, ...).
@@ -26,7 +28,7 @@ class AtomicFile {
   void commit();
 
  private:
-  std::string path_, temporary_;
+  std::string path_, target_, temporary_;
   int descriptor_ = -1;
 };
 

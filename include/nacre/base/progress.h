@@ -10,12 +10,12 @@
 
 namespace nacre {
 
-enum class ProgressStyle { kNone, kLines, kBar };
+enum class ProgressStyle { kSilent, kLines, kBar };
 
 /// Shared by the threads of one stage after another. Writes to standard error.
 class Progress {
  public:
-  explicit Progress(ProgressStyle style = ProgressStyle::kNone) : style_(style) {}
+  explicit Progress(ProgressStyle style = ProgressStyle::kSilent) : style_(style) {}
   /// Starts a stage of `total` units ("samples", "pixels").
   void begin(std::string stage, std::string unit, std::uint64_t total);
   /// Counts finished units; safe from any thread, prints at most a few times per second.

@@ -32,6 +32,8 @@ inline Vec3 face_normal(const Mesh& mesh, std::size_t triangle) {
   return area_vector(mesh, triangle).normalized();
 }
 
+/// Area of each triangle.
+std::vector<double> triangle_areas(const Mesh& mesh);
 /// Surface area, summed in double precision, in scene units squared.
 double surface_area(const Mesh& mesh);
 /// Enclosed volume with sign: positive where closed and faces point outward. Meaningless for open meshes.

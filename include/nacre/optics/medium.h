@@ -25,6 +25,7 @@ struct Medium {
   float scale = 1;            // mm per scene unit
   ProfileKind profile = ProfileKind::kDipole;
   Convention convention = Convention::kPublished;
+  bool lambert = false;  // the BRDF approximation: light leaves where it entered, by the profile's total
 
   float eta() const { return int_ior / ext_ior; }
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,15 +10,20 @@
 #include "nacre/base/report.h"
 #include "nacre/cache/cache.h"
 #include "nacre/render/image_file.h"
+#include "nacre/render/monte_carlo.h"
 #include "nacre/transport/world.h"
 
 namespace nacre {
 
-enum class Method { kHierarchical, kExact };
+/// How diffusion is evaluated. kHierarchical and kExact sum the cache, kMonteCarlo samples the surface
+/// itself, kLambert takes the material for an opaque surface of the profile's total reflectance.
+enum class Method { kHierarchical, kExact, kMonteCarlo, kLambert };
+/// Whether a method needs a cache.
+inline bool uses_cache(Method method) { return method == Method::kHierarchical || method == Method::kExact; }
 
 /// Which channels an image has beside R G B A.
 struct AovSelection {
-  bool layers = true;  // diffusion, specular, surface
+  bool layers = true;  // diffusion, single, specular, surface
   bool position = true, normal = true, depth = true, object_id = true;
 };
 
@@ -28,6 +34,11 @@ struct RenderParams {
   int samples_per_pixel = 16;
   Method method = Method::kHierarchical;
   double tolerance = 0.01;
+  int single_samples = 1;  // points per camera sample, each connected to every light; 0: no single scattering
+  int mc_samples = 64;     // kMonteCarlo: surface points per camera sample
+  MonteCarloSampling mc_sampling = MonteCarloSampling::kExponential;
+  // kMonteCarlo, kLambert: bounces of light before it enters; none: what the scene's integrator gives
+  std::optional<int> bounces;
   std::uint64_t seed = 0;
   AovSelection aovs;
 };
@@ -35,11 +46,12 @@ struct RenderParams {
 /// Parameters for a camera of the scene as its film and sampler have them, without a crop.
 RenderParams default_render_params(const Scene& scene, std::size_t camera);
 
-/// Renders one picture; `cache` holds a group for each medium of the scene. A pixel depends on the scene, the
-/// cache, its own coordinates, the seed, samples per pixel, method and tolerance, and on nothing else: not on
-/// the crop, nor on threads. Layers: `diffusion` and `specular` of translucent objects, `surface` of all
-/// others, means over the pixel's samples; R G B is their sum.
+/// Renders one picture; `cache` holds a group for each medium of the scene where the method uses one. A pixel
+/// depends on the scene, the cache, its own coordinates and the parameters but for the crop, and on nothing
+/// else: not on threads. Layers: `diffusion`, `single` and `specular` of translucent objects, `surface` of
+/// all others, means over the pixel's samples; R G B is their sum. Adds to `warnings` a line for each medium
+/// with samples that found no way out of it.
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,
-             Report& report);
+             Report& report, Warnings& warnings);
 
 }  // namespace nacre

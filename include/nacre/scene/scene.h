@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -120,6 +121,9 @@ struct Scene {
   Warnings warnings;
 };
 
+/// Bounces of light off opaque surfaces before it enters a medium: `asked` for, else by the integrator unless
+/// the medium wants direct light only.
+int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int> asked);
 /// Name for messages: id or "light 2".
 std::string light_name(const Scene& scene, std::size_t light);
 std::string medium_name(const Scene& scene, std::size_t medium);

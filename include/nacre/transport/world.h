@@ -35,6 +35,14 @@ struct SurfacePoint {
   Vec3 origin(float side) const noexcept {
     return offset_from_surface(position, geometric_normal * side, extent);
   }
+  /// 1 where `direction` points to the front, -1 to the back.
+  float side(const Vec3& direction) const noexcept {
+    return dot(geometric_normal, direction) > 0 ? 1.0f : -1.0f;
+  }
+  /// The shading normal on the side of `direction` (unit, pointing away from the surface). Where
+  /// interpolation tilts it so far that the mirror image of `direction` would lie inside the triangle's
+  /// plane, it is bent back until that image grazes the plane; its cosine with `direction` is above 0.
+  Vec3 normal_towards(const Vec3& direction) const noexcept;
 };
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept;
 

@@ -1,0 +1,68 @@
+// Straight ways through the inside of a translucent object.
+#pragma once
+
+#include <vector>
+
+#include "nacre/transport/light.h"
+#include "nacre/transport/world.h"
+
+namespace nacre {
+
+/// A boundary of the medium on a straight way.
+struct Crossing {
+  float t;  // distance from where the way starts
+  Hit hit;
+  bool leaving;  // out of the medium
+};
+
+/// The way from the point where the eye's ray enters to where it first leaves the medium or meets another
+/// object. Every point on it lies inside, off all surfaces by more than rounding.
+struct ViewSegment {
+  Vec3 begin, end;
+  float length = 0;
+  bool lost = false;                // no surface ended it; the bounding box did
+  std::vector<Crossing> crossings;  // boundaries between bodies of the same medium that overlap
+
+  Vec3 at(float distance) const { return begin + (end - begin) * (distance / length); }
+  /// How many of the medium's bodies a point of the segment is inside of.
+  int depth(float distance) const;
+};
+
+/// What is left of a light's connection to a point inside.
+struct LightSegment {
+  bool blocked = false;
+  bool lost = false;        // no surface ended it; the bounding box did
+  float length = 0;         // scene units, as attenuated: shortened by refraction
+  float transmittance = 1;  // of all boundaries
+  Vec3 direction;           // towards the light, refracted where the light enters for the last time
+  float cos_entry = 1, cos_refracted = 1;  // there, outside and inside
+};
+
+/// The bodies of one medium: where rays enter and leave them. A way through it is straight from the light to
+/// the point; refraction shortens each piece of it by the ratio of the cosines where the light enters
+/// (Jensen et al. 2001, section 4.1), and each boundary on it, also of another bulge of the same object,
+/// takes its Fresnel share. Other objects block it, and so do those inside.
+class Interior {
+ public:
+  Interior(const World& world, std::size_t medium);
+
+  /// From `origin`, just inside the surface, along the unit vector `direction`.
+  ViewSegment trace_view(const Vec3& origin, const Vec3& direction) const;
+  /// From `point`, inside `depth` bodies, to a light sample taken there. `crossings` is room to work in.
+  LightSegment trace_light(const Vec3& point, int depth, const LightSample& sample,
+                           std::vector<Crossing>& crossings) const;
+
+ private:
+  enum class Overlap { kCounted, kIgnored };
+  bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
+                 LightSegment& segment, float& open_since) const;
+  void enter_through(const Vec3& normal, const Vec3& direction, float span, LightSegment& segment) const;
+  void end_at_box(const Vec3& point, const Vec3& direction, float open_since, LightSegment& segment) const;
+
+  const World& world_;
+  int medium_;
+  float eta_;
+  Box3 box_;
+};
+
+}  // namespace nacre

@@ -1,0 +1,61 @@
+// Runs of pixels, each in waves of rays so that every stage is timed as a whole.
+#pragma once
+
+#include <atomic>
+#include <vector>
+
+#include "nacre/base/report.h"
+#include "nacre/render/camera.h"
+#include "render/pixels.h"
+#include "render/translucency.h"
+
+namespace nacre {
+
+/// Seconds of all threads per stage, and counts.
+struct Totals {
+  explicit Totals(std::size_t media) : lost(media), taken(media) {}
+  std::atomic<double> primary{0}, diffusion{0}, single{0}, surface{0};
+  std::atomic<std::uint64_t> rays{0}, shading_points{0}, evaluations{0};
+  std::vector<std::atomic<std::uint64_t>> lost, taken;  // samples of single scattering, by medium
+};
+
+class PixelLoop {
+ public:
+  /// World, cache and parameters have to outlive it.
+  PixelLoop(const World& world, const Cache& cache, const RenderParams& params);
+  /// Adds the samples of pixels [begin, end) of the rendered rectangle, row by row.
+  void render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const;
+
+ private:
+  // A ray on its way, what it is worth and which layer it adds to.
+  struct Path {
+    Ray ray;
+    Rgb throughput;
+    std::uint32_t pixel;   // index into the rendered rectangle
+    std::uint32_t sample;  // of the pixel
+    Layer layer;
+    Hit hit;
+    std::uint32_t branch = 1;  // which of the ways through glass this one is
+  };
+
+  std::array<int, 2> place(std::uint32_t pixel) const;
+  std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
+  std::vector<Path> start_paths(std::size_t begin, std::size_t end) const;
+  void record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const;
+  void add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const;
+  void shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const;
+  Rgb reflect_bounced_light(const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out, std::uint64_t key,
+                            std::uint32_t sample) const;
+  void continue_specular(const Path& path, const Bsdf& bsdf, const SurfacePoint& point, int wave,
+                         bool translucent, std::vector<Path>& next) const;
+
+  const World& world_;
+  const RenderParams& params_;
+  CameraRays camera_;
+  FilterSampler filter_;
+  int light_samples_;
+  int bounces_;
+  std::vector<Translucency> media_;  // parallel to Scene::media
+};
+
+}  // namespace nacre

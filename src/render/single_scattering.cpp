@@ -1,0 +1,128 @@
+// Sampling of first-order scattering.
+#include "nacre/render/single_scattering.h"
+
+#include "nacre/base/random.h"
+#include "nacre/optics/fresnel.h"
+#include "nacre/optics/phase.h"
+#include "render/interior.h"
+
+namespace nacre {
+namespace {
+
+// Free flights of three channels at once, none longer than `limit`. Densities are combined by the balance
+// heuristic, which for one sample drawn from the mean of them is that mean.
+class FreeFlight {
+ public:
+  FreeFlight(const Rgb& sigma_t, float limit) : limit_(limit) {
+    for (int k = 0; k < 3; ++k)
+      if (sigma_t[k] > 0) rates_[count_++] = sigma_t[k];
+  }
+  bool possible() const { return count_ > 0 && limit_ > 0; }
+
+  float sample(float u) const {
+    const int channel = std::min(static_cast<int>(u * static_cast<float>(count_)), count_ - 1);
+    const float rest = u * static_cast<float>(count_) - static_cast<float>(channel);
+    const float rate = rates_[channel];
+    return std::min(-std::log1p(rest * std::expm1(-rate * limit_)) / rate, limit_);
+  }
+  float pdf(float t) const {
+    float sum = 0;
+    for (int c = 0; c < count_; ++c)
+      sum += rates_[c] * std::exp(-rates_[c] * t) / -std::expm1(-rates_[c] * limit_);
+    return sum / static_cast<float>(count_);
+  }
+
+ private:
+  float limit_;
+  float rates_[3] = {};
+  int count_ = 0;
+};
+
+}  // namespace
+
+struct SingleScattering::Impl {
+  const World& world;
+  Interior interior;
+  Rgb sigma_s, sigma_t;  // per scene unit
+  Rgb g;
+  float eta;
+  bool conserving;
+
+  // Whether light goes in at all, and how: inward is unit length and below the triangle's plane.
+  bool refract_view(const SurfacePoint& point, const Vec3& out, Vec3& inward, float& transmittance) const {
+    const Vec3 normal = point.normal_towards(out);
+    transmittance = 1 - fresnel_reflectance(std::min(dot(normal, out), 1.0f), eta);
+    if (!refract(out, normal, eta, inward)) return false;
+    inward = inward.normalized();
+    // An interpolated normal may refract the ray along the triangle or out of it; then the triangle's own
+    // one decides.
+    const Vec3 plane = point.geometric_normal * point.side(out);
+    constexpr float kSteepEnough = -0.01f;
+    if (dot(inward, plane) < kSteepEnough) return true;
+    if (!refract(out, plane, eta, inward)) return false;
+    inward = inward.normalized();
+    return true;
+  }
+
+  // What reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the phase
+  // function.
+  Rgb connect(const Vec3& at, int depth, const Vec3& inward, const LightSample& sample,
+              std::vector<Crossing>& crossings, LostSamples& lost) const {
+    if (is_black(sample.irradiance)) return {0, 0, 0};
+    const LightSegment segment = interior.trace_light(at, depth, sample, crossings);
+    ++lost.taken;
+    lost.lost += segment.lost;
+    if (segment.blocked || segment.transmittance <= 0) return {0, 0, 0};
+    const float cosine = dot(segment.direction, inward);  // both propagate inwards and out again: see below
+    float factor = segment.transmittance;
+    if (conserving) factor *= segment.cos_entry / (eta * eta * segment.cos_refracted);
+    Rgb value;
+    for (int k = 0; k < 3; ++k)
+      // Light travels along -direction and on along -inward: the cosine between them is that of the two.
+      value[k] = sample.irradiance[k] * factor * std::exp(-sigma_t[k] * segment.length) *
+                 eval_henyey_greenstein(std::clamp(cosine, -1.0f, 1.0f), g[k]);
+    return value;
+  }
+};
+
+SingleScattering::SingleScattering(const World& world, std::size_t medium) {
+  const Medium& m = world.scene->media[medium];
+  impl_ = std::make_unique<const Impl>(Impl{world, Interior(world, medium), m.sigma_s * m.scale,
+                                            (m.sigma_s + m.sigma_a) * m.scale, m.g, m.eta(),
+                                            m.convention == Convention::kConserving});
+}
+SingleScattering::~SingleScattering() = default;
+SingleScattering::SingleScattering(SingleScattering&&) noexcept = default;
+
+Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int samples, std::uint64_t key,
+                               std::uint32_t first_sample, LostSamples& lost) const {
+  const Impl& m = *impl_;
+  Rgb sum(0, 0, 0);
+  Vec3 inward;
+  float transmittance = 0;
+  if (samples <= 0 || is_black(m.sigma_s) || !m.refract_view(point, out, inward, transmittance)) return sum;
+  const ViewSegment view = m.interior.trace_view(point.origin(-point.side(out)), inward);
+  ++lost.taken;
+  lost.lost += view.lost;
+  const FreeFlight flight(m.sigma_t, view.length);
+  if (!flight.possible()) return sum;
+
+  std::vector<Crossing> crossings;
+  for (int i = 0; i < samples; ++i) {
+    const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
+    const float distance = flight.sample(sobol_1d(index, hash_words(key, 0)));
+    const Vec3 at = view.at(distance);
+    const int depth = view.depth(distance);
+    Rgb arriving(0, 0, 0);
+    for (std::size_t light = 0; light < m.world.scene->lights.size(); ++light) {
+      const Vec2 u = sobol_2d(index, hash_words(key, 1 + light));
+      arriving += m.connect(at, depth, inward, sample_light(m.world, light, at, u), crossings, lost);
+    }
+    const float pdf = flight.pdf(distance);
+    for (int k = 0; k < 3; ++k)
+      sum[k] += arriving[k] * m.sigma_s[k] * std::exp(-m.sigma_t[k] * distance) / pdf;
+  }
+  return sum * (transmittance / static_cast<float>(samples));
+}
+
+}  // namespace nacre

@@ -1,0 +1,84 @@
+// From exitance to radiance.
+#include "render/translucency.h"
+
+#include "nacre/base/random.h"
+#include "nacre/optics/fresnel.h"
+#include "nacre/optics/profile.h"
+#include "nacre/transport/irradiance.h"
+
+namespace nacre {
+namespace {
+
+// Purposes of random numbers at one point.
+enum Purpose : std::uint64_t { kMonteCarloPoints = 11, kLambertLight, kSinglePoints };
+
+}  // namespace
+
+Translucency::Translucency(const World& world, std::size_t medium, const CacheGroup* group,
+                           const RenderParams& params)
+    : world_(world),
+      method_(world.scene->media[medium].lambert ? Method::kLambert : params.method),
+      eta_(world.scene->media[medium].eta()),
+      bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
+      light_samples_(world.scene->integrator.emitter_samples),
+      single_samples_(params.single_samples),
+      mc_samples_(params.mc_samples) {
+  const Medium& m = world.scene->media[medium];
+  const double transmittance =
+      m.convention == Convention::kConserving ? mean_transmittance(double{eta_}) : 1.0;
+  exit_factor_ = static_cast<float>(1 / (kPiD * transmittance));
+  const auto profiles = make_profiles(m);
+  for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
+  if (uses_cache(method_))
+    exitance_.emplace(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
+  else if (method_ == Method::kMonteCarlo)
+    monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
+  // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
+  if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
+    single_.emplace(world, medium);
+}
+
+void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
+                                  std::uint64_t& evaluations) const {
+  if (exitance_) {
+    std::vector<Vec3> positions;
+    positions.reserve(points.size());
+    for (const ExitPoint& point : points) positions.push_back(point.surface.position);
+    if (method_ == Method::kExact)
+      exitance_->eval_exact(positions, radiance, evaluations);
+    else
+      exitance_->eval(positions, radiance, evaluations);
+  } else {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const ExitPoint& point = points[i];
+      if (monte_carlo_) {
+        radiance[i] =
+            monte_carlo_->estimate(point.surface, mc_samples_, hash_words(point.key, kMonteCarloPoints),
+                                   point.sample * static_cast<std::uint32_t>(mc_samples_));
+        evaluations += static_cast<std::uint64_t>(mc_samples_);
+      } else {
+        radiance[i] = lambert_exitance(point);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float cos_o = std::min(dot(points[i].surface.normal_towards(points[i].out), points[i].out), 1.0f);
+    radiance[i] *= (1 - fresnel_reflectance(cos_o, eta_)) * exit_factor_;
+  }
+}
+
+Rgb Translucency::lambert_exitance(const ExitPoint& point) const {
+  const float side = point.surface.side(point.out);
+  const Receiver receiver{point.surface.position, point.surface.shading_normal * side,
+                          point.surface.origin(side), eta_};
+  return total_ * estimate_irradiance(world_, receiver, light_samples_, bounces_,
+                                      hash_words(point.key, kLambertLight),
+                                      point.sample * static_cast<std::uint32_t>(light_samples_));
+}
+
+Rgb Translucency::estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const {
+  return single_->estimate(point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
+                           point.sample * static_cast<std::uint32_t>(single_samples_), lost);
+}
+
+}  // namespace nacre

@@ -1,0 +1,52 @@
+// What leaves one translucent medium at the points that rays have hit: diffusion by any method, and single
+// scattering.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "nacre/cache/exitance.h"
+#include "nacre/render/monte_carlo.h"
+#include "nacre/render/render.h"
+#include "nacre/render/single_scattering.h"
+
+namespace nacre {
+
+/// A point on the surface of a medium and where its random numbers come from.
+struct ExitPoint {
+  SurfacePoint surface;
+  Vec3 out;              // unit, towards the eye
+  std::uint64_t key;     // of the pixel
+  std::uint32_t sample;  // of the pixel
+};
+
+class Translucency {
+ public:
+  /// `group` is read where the method needs it, else it may be nullptr.
+  Translucency(const World& world, std::size_t medium, const CacheGroup* group, const RenderParams& params);
+
+  /// Radiance that leaves by diffusion, for points that should lie near each other. Adds to `evaluations`
+  /// those of the profile.
+  void eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
+                      std::uint64_t& evaluations) const;
+  bool has_single_scattering() const { return single_.has_value(); }
+  Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
+
+ private:
+  Rgb lambert_exitance(const ExitPoint& point) const;
+
+  const World& world_;
+  Method method_;
+  float eta_;
+  float exit_factor_;  // 1/pi, or 1/(pi T) to lose nothing at the exit
+  Rgb total_;          // of the profile
+  int bounces_, light_samples_, single_samples_, mc_samples_;
+  std::optional<Exitance> exitance_;
+  std::optional<MonteCarloDiffusion> monte_carlo_;
+  std::optional<SingleScattering> single_;
+};
+
+}  // namespace nacre

@@ -1,0 +1,91 @@
+// label: unit
+// Files that are there whole or not at all, and what is not a file.
+#include "nacre/base/file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace nacre {
+namespace {
+
+namespace fs = std::filesystem;
+
+class AtomicFileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::path(testing::TempDir()) / "nacre-file-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::size_t entries() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  static void save(const std::string& to, const std::string& text) {
+    AtomicFile file(to);
+    file.write(text.data(), text.size());
+    file.commit();
+  }
+  fs::path folder_;
+};
+
+TEST_F(AtomicFileTest, AppearsWhenCommitted) {
+  {
+    AtomicFile file(path("a"));
+    file.write("half", 4);
+    EXPECT_FALSE(fs::exists(path("a")));
+  }
+  EXPECT_EQ(entries(), 0u);
+  save(path("a"), "first");
+  save(path("a"), "second");
+  EXPECT_EQ(read_text_file(path("a")), "second");
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(AtomicFileTest, SymbolicLinksStay) {
+  fs::create_directory(path("real"));
+  save(path("real/a"), "old");
+  fs::create_symlink("real/a", path("relative"));
+  fs::create_symlink(path("relative"), path("chain"));
+  fs::create_symlink("real/new", path("dangling"));
+  save(path("chain"), "new");
+  save(path("dangling"), "made");
+  EXPECT_EQ(read_text_file(path("real/a")), "new");
+  EXPECT_EQ(read_text_file(path("real/new")), "made");
+  for (const char* link : {"relative", "chain", "dangling"}) EXPECT_TRUE(fs::is_symlink(path(link))) << link;
+}
+
+TEST_F(AtomicFileTest, LinksInACircleAreRefused) {
+  fs::create_symlink("b", path("a"));
+  fs::create_symlink("a", path("b"));
+  EXPECT_THROW(save(path("a"), "x"), Error);
+  EXPECT_TRUE(fs::is_symlink(path("a")));
+}
+
+TEST_F(AtomicFileTest, DevicesAreWrittenTo) {
+  struct stat before, after;
+  ASSERT_EQ(::stat("/dev/null", &before), 0);
+  fs::create_symlink("/dev/null", path("null"));
+  save(path("null"), "into nothing");
+  EXPECT_TRUE(fs::is_symlink(path("null")));
+  ASSERT_EQ(::stat("/dev/null", &after), 0);
+  EXPECT_TRUE(S_ISCHR(after.st_mode));
+  EXPECT_EQ(before.st_ino, after.st_ino);
+  fs::create_symlink("/dev/full", path("full"));
+  EXPECT_THROW(save(path("full"), "no room"), Error);
+  EXPECT_TRUE(fs::is_symlink(path("full")));
+}
+
+TEST_F(AtomicFileTest, PipesAndFoldersAreRefused) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  EXPECT_THROW(save(path("pipe"), "x"), Error);
+  EXPECT_TRUE(fs::is_fifo(path("pipe")));
+  EXPECT_THROW(save(folder_.string(), "x"), Error);
+}
+
+}  // namespace
+}  // namespace nacre

@@ -1,0 +1,429 @@
+// label: analytic
+// Single scattering against closed forms of the half-space, and against quadrature that shares nothing with
+// the renderer: double precision, every triangle tested, a sphere by its equation.
+#include "nacre/render/single_scattering.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "../transport/scene_parts.h"
+#include "nacre/base/random.h"
+#include "nacre/optics/fresnel.h"
+
+namespace nacre {
+namespace {
+
+using namespace testing_support;
+
+Medium make_test_medium() {
+  Medium medium;
+  medium.sigma_s = {0.5f, 1.0f, 3.0f};
+  medium.sigma_a = {0.05f, 0.5f, 0.2f};
+  medium.int_ior = 1.4f;
+  medium.ext_ior = 1.0f;
+  return medium;
+}
+
+double henyey_greenstein(double cosine, double g) {
+  return (1 - g * g) / (4 * kPiD * std::pow(1 + g * g - 2 * g * cosine, 1.5));
+}
+double fresnel_transmittance(double cosine, double eta) {
+  const double cos_t = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
+  const double r_s = (cosine - eta * cos_t) / (cosine + eta * cos_t);
+  const double r_p = (eta * cosine - cos_t) / (eta * cosine + cos_t);
+  return 1 - (r_s * r_s + r_p * r_p) / 2;
+}
+Vec3d direction_at(double degrees, double azimuth) {
+  const double theta = degrees * kPiD / 180, phi = azimuth * kPiD / 180;
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
+
+SurfacePoint point_at(const World& world, const Vec3& origin, const Vec3& direction) {
+  return surface_point(world, world.tracer.intersect({origin, direction}));
+}
+
+// Mean of `groups` estimates of `per_group` samples each, and the standard error of that mean.
+struct Estimate {
+  Rgb mean{0, 0, 0}, error{0, 0, 0};
+};
+Estimate estimate_many(const SingleScattering& single, const SurfacePoint& point, const Vec3& out, int groups,
+                       int per_group) {
+  Vec3d sum(0, 0, 0), squares(0, 0, 0);
+  LostSamples lost;
+  for (int i = 0; i < groups; ++i) {
+    const Vec3d value(
+        single.estimate(point, out, per_group, hash_words(7, static_cast<std::uint64_t>(i)), 0, lost));
+    sum += value;
+    squares += value * value;
+  }
+  EXPECT_EQ(lost.lost, 0u);
+  Estimate result;
+  for (int k = 0; k < 3; ++k) {
+    const double mean = sum[k] / groups;
+    result.mean[k] = static_cast<float>(mean);
+    result.error[k] =
+        static_cast<float>(std::sqrt(std::max(squares[k] / groups - mean * mean, 0.0) / groups));
+  }
+  return result;
+}
+
+TEST(HalfSpace, BothConventionsMeetTheirClosedForms) {
+  // A box so large that only its top counts.
+  const double angles[5][3] = {{0, 0, 0}, {30, 30, 180}, {60, 20, 90}, {10, 75, 45}, {80, 80, 170}};
+  for (const float g : {-0.3f, 0.0f, 0.6f})
+    for (const Convention convention : {Convention::kPublished, Convention::kConserving})
+      for (const auto& [in_degrees, out_degrees, azimuth] : angles) {
+        Scene scene;
+        Medium medium = make_test_medium();
+        medium.g = {g, g, g};
+        medium.convention = convention;
+        add_shape(scene, placed(make_cube(), Vec3(1000, 1000, 1000), {0, 0, -1000}), kNone,
+                  add_medium(scene, medium));
+        const Vec3d in = direction_at(in_degrees, 0), out = direction_at(out_degrees, azimuth);
+        const Rgb irradiance(2, 3, 5);
+        add_directional_light(scene, Vec3(-in), irradiance);
+        const World world = make_world(scene, true);
+        const SingleScattering single(world, 0);
+        const SurfacePoint point = point_at(world, Vec3(0.3f, 0.2f, 1), {0, 0, -1});
+        const Estimate estimate = estimate_many(single, point, Vec3(out), 64, 1024);
+
+        const double eta = static_cast<double>(medium.eta());
+        const double cos_i = in.z, cos_o = out.z;
+        const double ci = std::sqrt(1 - (1 - cos_i * cos_i) / square(eta));
+        const double co = std::sqrt(1 - (1 - cos_o * cos_o) / square(eta));
+        // Refracted directions, both pointing up: sines shrink by eta.
+        const Vec3d in_inside(in.x / eta, in.y / eta, ci), out_inside(out.x / eta, out.y / eta, co);
+        const double fresnel = fresnel_transmittance(cos_i, eta) * fresnel_transmittance(cos_o, eta);
+        const double phase = henyey_greenstein(-in_inside.dot(out_inside), static_cast<double>(g));
+        const double side = convention == Convention::kPublished ? ci : cos_i / square(eta);
+        for (int k = 0; k < 3; ++k) {
+          const double alpha =
+              static_cast<double>(medium.sigma_s[k]) /
+              (static_cast<double>(medium.sigma_s[k]) + static_cast<double>(medium.sigma_a[k]));
+          const double expected =
+              alpha * fresnel * phase * static_cast<double>(irradiance[k]) * side / (ci + co);
+          EXPECT_NEAR(static_cast<double>(estimate.mean[k]) / expected, 1, 0.005)
+              << "g " << g << " angles " << in_degrees << " " << out_degrees << " channel " << k;
+        }
+      }
+}
+
+// A body as the reference integrators see it: where a line meets its boundary, and the normals there.
+struct Boundary {
+  double t;
+  Vec3d normal;  // outward
+};
+using Body = std::function<std::vector<Boundary>(const Vec3d& origin, const Vec3d& direction)>;
+
+// Integral along the refracted ray by the midpoint rule, of the published or conserving form, for a light at
+// a point or, with `light` a unit vector and `infinite`, from a direction.
+Vec3d integrate(const Body& body, const Medium& medium, const Vec3d& x, const Vec3d& normal, const Vec3d& out,
+                const Vec3d& light, bool infinite, const Vec3d& emission) {
+  const double eta = static_cast<double>(medium.eta());
+  const double cos_o = normal.dot(out);
+  const double cos_inside = std::sqrt(1 - (1 - cos_o * cos_o) / square(eta));
+  const Vec3d inward = normal * (cos_o / eta - cos_inside) - out / eta;
+  double length = 1e300;
+  for (const Boundary& b : body(x, inward))
+    if (b.t > 1e-9) length = std::min(length, b.t);
+
+  constexpr int kSteps = 20000;
+  Vec3d sum(0, 0, 0);
+  for (int step = 0; step < kSteps; ++step) {
+    const double s = length * (step + 0.5) / kSteps;
+    const Vec3d p = x + inward * s;
+    const Vec3d to = infinite ? light : (light - p).normalized();
+    const double distance = infinite ? 1e300 : (light - p).length();
+    std::vector<Boundary> ahead;
+    for (const Boundary& b : body(p, to))
+      if (b.t > 0 && b.t < distance) ahead.push_back(b);
+    std::sort(ahead.begin(), ahead.end(), [](const Boundary& a, const Boundary& b) { return a.t < b.t; });
+    // Inside, outside, inside, ...: the light passes each boundary, pieces inside attenuate.
+    double optical = 0, transmittance = 1, entered = 0;
+    Vec3d inside_direction = to;
+    double conserving = 1;
+    for (std::size_t i = 0; i < ahead.size(); ++i) {
+      const bool leaving = i % 2 == 0;
+      const double cosine = std::abs(to.dot(ahead[i].normal));
+      const double refracted = std::sqrt(1 - (1 - cosine * cosine) / square(eta));
+      transmittance *= fresnel_transmittance(cosine, eta);
+      if (!leaving) {
+        entered = ahead[i].t;
+        continue;
+      }
+      optical += (ahead[i].t - entered) * cosine / refracted;
+      if (i > 0) continue;
+      const Vec3d n = to.dot(ahead[i].normal) > 0 ? ahead[i].normal : -ahead[i].normal;
+      inside_direction = n * (refracted - cosine / eta) + to / eta;
+      conserving = cosine / (square(eta) * refracted);
+    }
+    if (medium.convention == Convention::kConserving) transmittance *= conserving;
+    for (int k = 0; k < 3; ++k) {
+      const double sigma_s = static_cast<double>(medium.sigma_s[k] * medium.scale);
+      const double sigma_t = sigma_s + static_cast<double>(medium.sigma_a[k] * medium.scale);
+      sum[k] += sigma_s * std::exp(-sigma_t * (s + optical)) * transmittance *
+                henyey_greenstein(inside_direction.dot(inward), static_cast<double>(medium.g[k])) *
+                emission[k] / (infinite ? 1 : square(distance));
+    }
+  }
+  return sum * (fresnel_transmittance(cos_o, eta) * length / kSteps);
+}
+
+void expect_agreement(const Estimate& estimate, const Vec3d& expected, double tolerance,
+                      const std::string& what) {
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(static_cast<double>(estimate.mean[k]) / expected[k], 1,
+                tolerance + 4 * static_cast<double>(estimate.error[k]) / expected[k])
+        << what << " channel " << k;
+    EXPECT_LT(static_cast<double>(estimate.error[k]), 0.003 * expected[k]) << what;
+  }
+}
+
+TEST(Sphere, MeetsQuadrature) {
+  constexpr double kRadius = 4;
+  const Body body = [](const Vec3d& origin, const Vec3d& direction) {
+    const double b = origin.dot(direction), c = origin.length2() - square(kRadius);
+    const double root = std::sqrt(std::max(b * b - c, 0.0));
+    std::vector<Boundary> result;
+    for (const double t : {-b - root, -b + root}) result.push_back({t, (origin + direction * t) / kRadius});
+    return result;
+  };
+  for (const Convention convention : {Convention::kPublished, Convention::kConserving}) {
+    Scene scene;
+    Medium medium = make_test_medium();
+    medium.convention = convention;
+    medium.g = {-0.3f, 0.0f, 0.6f};
+    medium.scale = 0.5f;
+    add_shape(scene, placed(make_sphere(), static_cast<float>(kRadius), {0, 0, 0}), kNone,
+              add_medium(scene, medium));
+    const Vec3d light(3, 9, 6), emission(100, 200, 300);
+    add_point_light(scene, Vec3(light), Rgb(Vec3(emission)));
+    const World world = make_world(scene, true);
+    const SingleScattering single(world, 0);
+    // From the lit side to the unlit one.
+    for (const Vec3d& eye : {Vec3d(2, 8, 3), Vec3d(10, 1, 2), Vec3d(-3, -2, 9), Vec3d(-2, -9, -3)}) {
+      const Vec3d out = eye.normalized();
+      const Vec3d x = (out + Vec3d(0.2, 0.1, -0.1)).normalized() * kRadius;
+      const SurfacePoint point = point_at(world, Vec3(x * 2), Vec3(-x.normalized()));
+      const Vec3d expected = integrate(body, medium, x, x.normalized(), out, light, false, emission);
+      expect_agreement(estimate_many(single, point, Vec3(out), 64, 256), expected, 0.005,
+                       fmt::format("eye {} {} {}", eye.x, eye.y, eye.z));
+    }
+  }
+}
+
+// The prism over a U-shaped outline: two towers of height 6 on a common base.
+Mesh make_u_shape() {
+  const Vec2 outline[] = {{0, 0}, {7, 0}, {7, 6}, {5, 6}, {5, 2}, {2, 2}, {2, 6}, {0, 6}};
+  const int caps[][3] = {{0, 1, 4}, {0, 4, 5}, {1, 2, 3}, {1, 3, 4}, {0, 5, 6}, {0, 6, 7}};
+  Mesh mesh;
+  for (const float z : {-2.0f, 2.0f})
+    for (const Vec2& p : outline) mesh.positions.push_back({p.x, p.y, z});
+  for (const auto& cap : caps) {
+    const auto a = static_cast<std::uint32_t>(cap[0]), b = static_cast<std::uint32_t>(cap[1]),
+               c = static_cast<std::uint32_t>(cap[2]);
+    mesh.triangles.push_back({c, b, a});
+    mesh.triangles.push_back({a + 8, b + 8, c + 8});
+  }
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    const std::uint32_t j = (i + 1) % 8;
+    mesh.triangles.push_back({i, j, j + 8});
+    mesh.triangles.push_back({i, j + 8, i + 8});
+  }
+  return mesh;
+}
+
+// Every triangle of a mesh, by Moeller and Trumbore's test in double precision.
+Body make_body(const Mesh& mesh) {
+  return [&mesh](const Vec3d& origin, const Vec3d& direction) {
+    std::vector<Boundary> result;
+    for (const Triangle& t : mesh.triangles) {
+      const Vec3d a(mesh.positions[t[0]]), e1 = Vec3d(mesh.positions[t[1]]) - a,
+                                           e2 = Vec3d(mesh.positions[t[2]]) - a;
+      const Vec3d p = direction.cross(e2), s = origin - a, q = s.cross(e1);
+      const double determinant = e1.dot(p), u = s.dot(p) / determinant, v = direction.dot(q) / determinant;
+      if (determinant != 0 && u >= 0 && v >= 0 && u + v <= 1)
+        result.push_back({e2.dot(q) / determinant, e1.cross(e2).normalized()});
+    }
+    return result;
+  };
+}
+
+TEST(ConcaveBody, MeetsQuadratureThroughSeveralEntriesAndExits) {
+  const Mesh mesh = make_u_shape();
+  EXPECT_NEAR(signed_volume(mesh), 30 * 4, 1e-4);
+  for (const Convention convention : {Convention::kPublished, Convention::kConserving}) {
+    Scene scene;
+    Medium medium = make_test_medium();
+    medium.convention = convention;
+    medium.g = {-0.3f, 0.0f, 0.6f};
+    medium.scale = 0.3f;
+    add_shape(scene, mesh, kNone, add_medium(scene, medium));
+    // Low from the right: through the right tower, the gap, and into the left one.
+    const Vec3d light = Vec3d(1, 0.137, 0.071).normalized(), emission(4, 5, 6);
+    add_directional_light(scene, Vec3(-light), Rgb(Vec3(emission)));
+    const World world = make_world(scene, true);
+    const SingleScattering single(world, 0);
+    struct View {
+      Vec3d x, normal, out;
+    };
+    for (const View& view :
+         {View{{0.9, 4.1, 2}, {0, 0, 1}, {0.3, 0.2, 0.8}}, View{{0, 3.3, 0.4}, {-1, 0, 0}, {-0.9, 0.3, -0.2}},
+          View{{3.3, 2, 0.3}, {0, 1, 0}, {0.2, 0.9, 0.5}}}) {
+      const Vec3d out = view.out.normalized();
+      const SurfacePoint point = point_at(world, Vec3(view.x + view.normal * 0.5), Vec3(-view.normal));
+      const Vec3d expected =
+          integrate(make_body(mesh), medium, view.x, view.normal, out, light, true, emission);
+      expect_agreement(estimate_many(single, point, Vec3(out), 64, 256), expected, 0.005,
+                       fmt::format("x {} {} {}", view.x.x, view.x.y, view.x.z));
+    }
+  }
+}
+
+// Two bodies of one medium that overlap are one; it makes no difference which of them comes first.
+TEST(OverlappingBodies, AttenuateAsTheirUnion) {
+  const auto estimate = [](bool split) {
+    Scene scene;
+    const int medium = add_medium(scene, make_test_medium());
+    if (split) {
+      add_shape(scene, placed(make_cube(), Vec3(2, 2, 3), {0, 0, 1}), kNone, medium);   // z -2 .. 4
+      add_shape(scene, placed(make_cube(), Vec3(2, 2, 2), {0, 0, -1}), kNone, medium);  // z -3 .. 1
+    } else {
+      add_shape(scene, placed(make_cube(), Vec3(2, 2, 3.5f), {0, 0, 0.5f}), kNone, medium);
+    }
+    add_directional_light(scene, {0.3f, -0.2f, 1}, {1, 1, 1});
+    const World world = make_world(scene, true);
+    const SingleScattering single(world, 0);
+    return estimate_many(single, point_at(world, {0.3f, 0.2f, 9}, {0, 0, -1}), {0, 0, 1}, 16, 256);
+  };
+  const Estimate one = estimate(false), two = estimate(true);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_GT(one.mean[k], 0);
+    EXPECT_NEAR(two.mean[k] / one.mean[k], 1, 1e-4);
+  }
+}
+
+TEST(OtherObjects, CastFullShadowsUnlessShadowsAreOff) {
+  Scene scene;
+  add_shape(scene, placed(make_sphere(), 4, {0, 0, 0}), kNone, add_medium(scene, make_test_medium()));
+  add_directional_light(scene, {0, 0, -1}, {1, 1, 1});
+  const auto estimate = [&](bool shadows) {
+    const World world = make_world(scene, shadows);
+    const SingleScattering single(world, 0);
+    return estimate_many(single, point_at(world, {0, 0, 5}, {0, 0, -1}), Vec3(1, 0, 1).normalized(), 8, 64)
+        .mean;
+  };
+  const Rgb free = estimate(true);
+  EXPECT_GT(min_channel(free), 0);
+  add_shape(scene, placed(make_rectangle(), 10, {0, 0, 8}));
+  EXPECT_TRUE(is_black(estimate(true)));
+  EXPECT_EQ(estimate(false), free);
+  // An opaque body inside blocks as well.
+  scene.shapes.pop_back();
+  add_shape(scene, placed(make_sphere(), 3.9f, {0, 0, 0}));
+  const Rgb shell = estimate(true);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_GT(shell[k], 0);
+    EXPECT_LT(shell[k], 0.9f * free[k]);
+  }
+}
+
+// With its base taken away the bounding box closes the object where the base was: the same light, but for
+// what the box does not know.
+TEST(OpenMesh, EndsAtItsBoundingBox) {
+  const auto estimate = [](bool open, std::uint64_t& lost_count) {
+    Scene scene;
+    Mesh cube = placed(make_cube(), 2, {0, 0, 0});
+    if (open)
+      std::erase_if(cube.triangles, [&](const Triangle& t) {
+        return cross(cube.positions[t[1]] - cube.positions[t[0]], cube.positions[t[2]] - cube.positions[t[0]])
+                   .z < 0;
+      });
+    add_shape(scene, std::move(cube), kNone, add_medium(scene, make_test_medium()));
+    add_directional_light(scene, {0.2f, 0.1f, 1}, {1, 1, 1});  // from below
+    const World world = make_world(scene, true);
+    const SingleScattering single(world, 0);
+    LostSamples lost;
+    const Rgb value =
+        single.estimate(point_at(world, {0.3f, 0.2f, 5}, {0, 0, -1}), {0, 0, 1}, 4096, 1, 0, lost);
+    EXPECT_EQ(lost.taken, 4096u + 1);
+    lost_count = lost.lost;
+    return value;
+  };
+  std::uint64_t closed_lost = 0, open_lost = 0;
+  const Rgb closed = estimate(false, closed_lost), open = estimate(true, open_lost);
+  EXPECT_EQ(closed_lost, 0u);
+  EXPECT_EQ(open_lost, 4096u + 1);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(open[k] / closed[k], 1, 1e-3);
+}
+
+TEST(Sampling, WellDistributedPointsBeatIndependentOnes) {
+  Scene scene;
+  add_shape(scene, placed(make_sphere(), 4, {0, 0, 0}), kNone, add_medium(scene, make_test_medium()));
+  add_area_light(scene, flipped(placed(make_rectangle(), 3, {1, 2, 9})), {10, 10, 10});
+  const World world = make_world(scene, true);
+  const SingleScattering single(world, 0);
+  const SurfacePoint point = point_at(world, {1, 0.5f, 9}, {0, 0, -1});
+  const Vec3 out = Vec3(0.3f, 0.2f, 1).normalized();
+  // Variance of the mean of n samples: one sequence, or a new scramble for each.
+  const auto variance = [&](int n, bool independent) {
+    constexpr int kTrials = 400;
+    double sum = 0, squares = 0;
+    LostSamples lost;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      double value = 0;
+      for (int i = 0; i < n; ++i) {
+        const auto t = static_cast<std::uint64_t>(trial), s = static_cast<std::uint64_t>(i);
+        value += double{single
+                            .estimate(point, out, 1, hash_words(t, independent ? s : 0),
+                                      independent ? 0u : static_cast<std::uint32_t>(i), lost)
+                            .y} /
+                 n;
+      }
+      sum += value;
+      squares += value * value;
+    }
+    return squares / kTrials - square(sum / kTrials);
+  };
+  const double independent_4 = variance(4, true), independent_64 = variance(64, true);
+  const double even_4 = variance(4, false), even_64 = variance(64, false);
+  RecordProperty("variance",
+                 fmt::format("{:.3g} {:.3g} independent, {:.3g} {:.3g} Owen-scrambled Sobol (4, 64)",
+                             independent_4, independent_64, even_4, even_64));
+  fmt::print("variance at 4 and 64 samples: independent {:.3g} {:.3g}, Owen-scrambled Sobol {:.3g} {:.3g}\n",
+             independent_4, independent_64, even_4, even_64);
+  EXPECT_NEAR(independent_4 / independent_64, 16, 5);  // 1/N
+  EXPECT_GT(even_4 / even_64, 32);                     // faster than 1/N
+  EXPECT_LT(even_64, independent_64 / 8);
+}
+
+TEST(Extremes, GiveFiniteRadiance) {
+  for (const float sigma : {0.0f, 1e-12f, 1e-3f, 1e3f, 1e6f})
+    for (const float scale : {1e-6f, 1.0f, 1e6f}) {
+      Scene scene;
+      Medium medium = make_test_medium();
+      medium.sigma_s = {sigma, 1.0f, 0.0f};
+      medium.sigma_a = {sigma, 0.0f, sigma};
+      medium.g = {0.999f, -0.999f, 0};
+      medium.scale = scale;
+      add_shape(scene, placed(make_sphere(), 4, {1e3f, 0, 0}), kNone, add_medium(scene, medium));
+      add_point_light(scene, {1e3f, 0, 0}, {1, 1, 1});  // inside
+      add_point_light(scene, {1e3f, 4, 0}, {1, 1, 1});  // on the surface
+      add_directional_light(scene, {0, 0, 1}, {1, 1, 1});
+      const World world = make_world(scene, true);
+      const SingleScattering single(world, 0);
+      LostSamples lost;
+      for (int i = 0; i < 200; ++i) {
+        const Vec3 from = sample_uniform_sphere(sobol_2d(static_cast<std::uint32_t>(i), 3));
+        const SurfacePoint point = point_at(world, Vec3(1e3f, 0, 0) + from * 8.0f, -from);
+        Vec3 out = sample_uniform_sphere(sobol_2d(static_cast<std::uint32_t>(i), 4));
+        out *= dot(out, point.geometric_normal) < 0 ? -1.0f : 1.0f;
+        const Rgb value = single.estimate(point, out, 4, 5, 0, lost);
+        for (int k = 0; k < 3; ++k) ASSERT_TRUE(std::isfinite(value[k]) && value[k] >= 0) << value[k];
+      }
+    }
+}
+
+}  // namespace
+}  // namespace nacre
