@@ -19,17 +19,17 @@ namespace {
   fail(ErrorCode::kIo, path, "cannot {}: {}", action, std::strerror(error));
 }
 
-// Where a chain of symbolic links leads, so that renaming replaces the file and not the link to it. A circle
-// ends somewhere in it, and opening that fails.
+// Where a chain of symbolic links leads, so that renaming replaces the file and not the link to it.
 std::string follow_links(const std::string& path) {
   std::filesystem::path at = path;
   std::error_code error;
   for (int link = 0; link < 40; ++link) {
     const auto target = std::filesystem::read_symlink(at, error);
-    if (error) break;
+    if (error) return at.string();
     at = at.parent_path() / target;
   }
-  return at.string();
+  errno = ELOOP;
+  fail_io(path, "write");
 }
 
 }  // namespace

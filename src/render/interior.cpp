@@ -27,13 +27,22 @@ float exit_box(const Box3& box, const Vec3& origin, const Vec3& direction, Vec3&
   return std::isfinite(nearest) ? std::max(nearest, 0.0f) : 0.0f;
 }
 
+// Distance from `position` along a direction to the plane of a triangle that a ray of that direction from
+// nearby has hit.
+float distance_to_plane(const Vec3& position, const Vec3& direction, const SurfacePoint& hit) {
+  const float t = dot(hit.position - position, hit.geometric_normal) / dot(direction, hit.geometric_normal);
+  return std::isfinite(t) ? std::max(t, 0.0f) : 0.0f;
+}
+
 }  // namespace
 
-int ViewSegment::depth(float distance) const {
-  int depth = 1;
+InteriorPoint ViewSegment::at(float distance) const {
+  InteriorPoint point{begin + direction * distance,
+                      first_origin + (last_origin - first_origin) * (distance / length)};
   for (const Crossing& crossing : crossings)
-    if (crossing.t < distance) depth += crossing.leaving ? -1 : 1;
-  return std::max(depth, 1);
+    if (crossing.t < distance) point.depth += crossing.leaving ? -1 : 1;
+  point.depth = std::max(point.depth, 1);
+  return point;
 }
 
 Interior::Interior(const World& world, std::size_t medium)
@@ -42,42 +51,46 @@ Interior::Interior(const World& world, std::size_t medium)
     if (shape.medium == medium_) box_.extendBy(bounds(shape.mesh));
 }
 
-ViewSegment Interior::trace_view(const Vec3& origin, const Vec3& direction) const {
+ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const {
   ViewSegment segment;
-  segment.begin = segment.end = origin;
-  Ray ray{origin, direction};
+  segment.begin = from.position;
+  segment.direction = direction;
+  segment.first_origin = segment.last_origin = from.origin(-from.side(out));
+  Ray ray{segment.first_origin, direction};
   int depth = 1;
   for (std::size_t n = 0; n < kMostCrossings; ++n) {
     const Hit hit = world_.tracer.intersect(ray);
     if (!hit) {
       Vec3 normal;
       segment.lost = true;
-      segment.end = origin + direction * exit_box(box_, origin, direction, normal);
+      segment.length = exit_box(box_, from.position, direction, normal);
+      segment.last_origin = from.position + direction * segment.length;
       break;
     }
     const SurfacePoint point = surface_point(world_, hit);
     const float side = point.side(direction);
+    const float t = distance_to_plane(from.position, direction, point);
     const bool foreign = world_.shape(hit).medium != medium_;
     depth += side > 0 ? -1 : 1;
     if (foreign || depth == 0) {
-      segment.end = point.origin(-side);
+      // Between surfaces closer than the offsets from them there is no inside to speak of.
+      segment.last_origin = point.origin(-side);
+      segment.length = dot(segment.last_origin - segment.first_origin, direction) > 0 ? t : 0.0f;
       break;
     }
-    segment.crossings.push_back({dot(point.position - origin, direction), hit, side > 0});
+    segment.crossings.push_back({t, hit, side > 0});
     ray.origin = point.origin(side);
   }
-  // Between surfaces closer than the offsets from them there is no inside to speak of.
-  segment.length = dot(segment.end - origin, direction);
   return segment;
 }
 
-LightSegment Interior::trace_light(const Vec3& point, int depth, const LightSample& sample,
+LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample& sample,
                                    std::vector<Crossing>& crossings) const {
   LightSegment segment;
   segment.direction = sample.direction;
   crossings.clear();
   const bool infinite = std::isinf(sample.distance);
-  Ray ray{point, sample.direction};
+  Ray ray{point.origin, sample.direction};
   for (;;) {
     if (!infinite) {
       ray.direction = sample.point - ray.origin;
@@ -90,14 +103,16 @@ LightSegment Interior::trace_light(const Vec3& point, int depth, const LightSamp
     const bool foreign = world_.shape(hit).medium != medium_;
     segment.blocked = (foreign && world_.shadows) || crossings.size() == kMostCrossings;
     if (segment.blocked) return segment;
-    if (!foreign) crossings.push_back({dot(at.position - point, sample.direction), hit, side > 0});
+    if (!foreign)
+      crossings.push_back({distance_to_plane(point.position, sample.direction, at), hit, side > 0});
     const Vec3 origin = at.origin(side);
     if (!(dot(origin - ray.origin, sample.direction) > 0)) break;  // as far as precision goes
     ray.origin = origin;
   }
 
   float open_since = 0;
-  if (sum_spans(crossings, depth, Overlap::kCounted, sample.direction, segment, open_since)) return segment;
+  if (sum_spans(crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
+    return segment;
   if (!infinite && box_.intersects(sample.point)) {  // the light is inside
     segment.length += sample.distance - open_since;
     return segment;
@@ -106,8 +121,8 @@ LightSegment Interior::trace_light(const Vec3& point, int depth, const LightSamp
   LightSegment guess;
   guess.direction = sample.direction;
   guess.lost = true;
-  if (!sum_spans(crossings, depth, Overlap::kIgnored, sample.direction, guess, open_since))
-    end_at_box(point, sample.direction, open_since, guess);
+  if (!sum_spans(crossings, point.depth, Overlap::kIgnored, sample.direction, guess, open_since))
+    end_at_box(point.position, sample.direction, open_since, guess);
   return guess;
 }
 

@@ -15,17 +15,23 @@ struct Crossing {
   bool leaving;  // out of the medium
 };
 
+/// A point inside: where it is, and where rays from it start, which is off all surfaces by more than rounding
+/// and for large triangles that much further from the first.
+struct InteriorPoint {
+  Vec3 position, origin;
+  int depth = 1;  // number of bodies of the medium that it is inside of
+};
+
 /// The way from the point where the eye's ray enters to where it first leaves the medium or meets another
-/// object. Every point on it lies inside, off all surfaces by more than rounding.
+/// object.
 struct ViewSegment {
-  Vec3 begin, end;
+  Vec3 begin, direction;           // on the surface; unit
+  Vec3 first_origin, last_origin;  // its ends, off the surfaces
   float length = 0;
   bool lost = false;                // no surface ended it; the bounding box did
   std::vector<Crossing> crossings;  // boundaries between bodies of the same medium that overlap
 
-  Vec3 at(float distance) const { return begin + (end - begin) * (distance / length); }
-  /// How many of the medium's bodies a point of the segment is inside of.
-  int depth(float distance) const;
+  InteriorPoint at(float distance) const;
 };
 
 /// What is left of a light's connection to a point inside.
@@ -46,10 +52,10 @@ class Interior {
  public:
   Interior(const World& world, std::size_t medium);
 
-  /// From `origin`, just inside the surface, along the unit vector `direction`.
-  ViewSegment trace_view(const Vec3& origin, const Vec3& direction) const;
-  /// From `point`, inside `depth` bodies, to a light sample taken there. `crossings` is room to work in.
-  LightSegment trace_light(const Vec3& point, int depth, const LightSample& sample,
+  /// From a point of the surface, seen from the side of `out`, along the unit vector `direction` inwards.
+  ViewSegment trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const;
+  /// From a point to a light sample taken there. `crossings` is room to work in.
+  LightSegment trace_light(const InteriorPoint& point, const LightSample& sample,
                            std::vector<Crossing>& crossings) const;
 
  private:

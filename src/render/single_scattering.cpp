@@ -66,14 +66,14 @@ struct SingleScattering::Impl {
 
   // What reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the phase
   // function.
-  Rgb connect(const Vec3& at, int depth, const Vec3& inward, const LightSample& sample,
+  Rgb connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample,
               std::vector<Crossing>& crossings, LostSamples& lost) const {
     if (is_black(sample.irradiance)) return {0, 0, 0};
-    const LightSegment segment = interior.trace_light(at, depth, sample, crossings);
+    const LightSegment segment = interior.trace_light(at, sample, crossings);
     ++lost.taken;
     lost.lost += segment.lost;
     if (segment.blocked || segment.transmittance <= 0) return {0, 0, 0};
-    const float cosine = dot(segment.direction, inward);  // both propagate inwards and out again: see below
+    const float cosine = dot(segment.direction, inward);
     float factor = segment.transmittance;
     if (conserving) factor *= segment.cos_entry / (eta * eta * segment.cos_refracted);
     Rgb value;
@@ -101,7 +101,7 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
   Vec3 inward;
   float transmittance = 0;
   if (samples <= 0 || is_black(m.sigma_s) || !m.refract_view(point, out, inward, transmittance)) return sum;
-  const ViewSegment view = m.interior.trace_view(point.origin(-point.side(out)), inward);
+  const ViewSegment view = m.interior.trace_view(point, out, inward);
   ++lost.taken;
   lost.lost += view.lost;
   const FreeFlight flight(m.sigma_t, view.length);
@@ -111,12 +111,11 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
   for (int i = 0; i < samples; ++i) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
     const float distance = flight.sample(sobol_1d(index, hash_words(key, 0)));
-    const Vec3 at = view.at(distance);
-    const int depth = view.depth(distance);
+    const InteriorPoint at = view.at(distance);
     Rgb arriving(0, 0, 0);
     for (std::size_t light = 0; light < m.world.scene->lights.size(); ++light) {
       const Vec2 u = sobol_2d(index, hash_words(key, 1 + light));
-      arriving += m.connect(at, depth, inward, sample_light(m.world, light, at, u), crossings, lost);
+      arriving += m.connect(at, inward, sample_light(m.world, light, at.position, u), crossings, lost);
     }
     const float pdf = flight.pdf(distance);
     for (int k = 0; k < 3; ++k)

@@ -207,7 +207,7 @@ TEST(Sphere, MeetsQuadrature) {
       const Vec3d x = (out + Vec3d(0.2, 0.1, -0.1)).normalized() * kRadius;
       const SurfacePoint point = point_at(world, Vec3(x * 2), Vec3(-x.normalized()));
       const Vec3d expected = integrate(body, medium, x, x.normalized(), out, light, false, emission);
-      expect_agreement(estimate_many(single, point, Vec3(out), 64, 256), expected, 0.005,
+      expect_agreement(estimate_many(single, point, Vec3(out), 64, 1024), expected, 0.005,
                        fmt::format("eye {} {} {}", eye.x, eye.y, eye.z));
     }
   }
@@ -364,7 +364,7 @@ TEST(Sampling, WellDistributedPointsBeatIndependentOnes) {
   add_area_light(scene, flipped(placed(make_rectangle(), 3, {1, 2, 9})), {10, 10, 10});
   const World world = make_world(scene, true);
   const SingleScattering single(world, 0);
-  const SurfacePoint point = point_at(world, {1, 0.5f, 9}, {0, 0, -1});
+  const SurfacePoint point = point_at(world, {1, 0.5f, 6}, {0, 0, -1});
   const Vec3 out = Vec3(0.3f, 0.2f, 1).normalized();
   // Variance of the mean of n samples: one sequence, or a new scramble for each.
   const auto variance = [&](int n, bool independent) {
