@@ -1,6 +1,8 @@
 // Hashing, SplitMix64 and hash-based Owen scrambling.
 #include "nacre/base/random.h"
 
+#include <array>
+
 namespace nacre {
 namespace {
 
@@ -40,6 +42,20 @@ std::uint32_t sobol_second(std::uint32_t index) noexcept {
   return result;
 }
 
+// Third one: primitive polynomial x^2 + x + 1, first direction numbers 1 and 3 (Joe & Kuo 2008).
+constexpr std::array<std::uint32_t, 32> third_directions() {
+  std::array<std::uint32_t, 32> v{1u << 31, 3u << 30};
+  for (std::size_t i = 2; i < v.size(); ++i) v[i] = v[i - 1] ^ v[i - 2] ^ (v[i - 2] >> 2);
+  return v;
+}
+std::uint32_t sobol_third(std::uint32_t index) noexcept {
+  static constexpr std::array<std::uint32_t, 32> kDirections = third_directions();
+  std::uint32_t result = 0;
+  for (std::size_t i = 0; index != 0; index >>= 1, ++i)
+    if (index & 1u) result ^= kDirections[i];
+  return result;
+}
+
 }  // namespace
 
 std::uint64_t hash_words(std::uint64_t a, std::uint64_t b, std::uint64_t c, std::uint64_t d) noexcept {
@@ -61,6 +77,15 @@ Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept {
       owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
   return {to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds))),
           to_unit_float(owen_scramble(sobol_second(shuffled), static_cast<std::uint32_t>(seeds >> 32)))};
+}
+
+Vec3 sobol_3d(std::uint32_t index, std::uint64_t scramble) noexcept {
+  const std::uint64_t seeds = mix(scramble + 0x9e3779b97f4a7c15ull), third = mix(seeds);
+  const std::uint32_t shuffled =
+      owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
+  return {to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds))),
+          to_unit_float(owen_scramble(sobol_second(shuffled), static_cast<std::uint32_t>(seeds >> 32))),
+          to_unit_float(owen_scramble(sobol_third(shuffled), static_cast<std::uint32_t>(third)))};
 }
 
 float sobol_1d(std::uint32_t index, std::uint64_t scramble) noexcept {

@@ -1,6 +1,8 @@
 // Sampling of first-order scattering.
 #include "nacre/render/single_scattering.h"
 
+#include <array>
+
 #include "nacre/base/random.h"
 #include "nacre/optics/fresnel.h"
 #include "nacre/optics/phase.h"
@@ -9,33 +11,59 @@
 namespace nacre {
 namespace {
 
-// Free flights of three channels at once, none longer than `limit`. Densities are combined by the balance
-// heuristic, which for one sample drawn from the mean of them is that mean.
+// Distances along the view ray, none longer than `limit`: free flights of the three channels at their own
+// rates, and at twice those, which is how light falls off that comes from in front and is attenuated on its
+// way in as well. All densities are combined by the balance heuristic: a sample is drawn from their mean, by
+// inverting its cumulative distribution as a whole, so that evenly spread numbers give evenly spread
+// distances.
 class FreeFlight {
  public:
-  FreeFlight(const Rgb& sigma_t, float limit) : limit_(limit) {
+  FreeFlight(const Rgb& sigma_t, float limit) : limit_(double{limit}) {
     for (int k = 0; k < 3; ++k)
-      if (sigma_t[k] > 0) rates_[count_++] = sigma_t[k];
+      for (const float factor : {1.0f, 2.0f})
+        if (sigma_t[k] > 0) add(double{sigma_t[k] * factor});
   }
   bool possible() const { return count_ > 0 && limit_ > 0; }
 
-  float sample(float u) const {
-    const int channel = std::min(static_cast<int>(u * static_cast<float>(count_)), count_ - 1);
-    const float rest = u * static_cast<float>(count_) - static_cast<float>(channel);
-    const float rate = rates_[channel];
-    return std::min(-std::log1p(rest * std::expm1(-rate * limit_)) / rate, limit_);
+  double sample(double u) const {
+    // The mean's quantile lies between those of its terms.
+    double low = limit_, high = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double quantile = -std::log1p(-u * reach_[i]) / rate_[i];
+      low = std::min(low, quantile);
+      high = std::max(high, quantile);
+    }
+    double t = low;
+    for (int step = 0; step < 60 && high - low > 1e-7 * high; ++step) {
+      double cumulative = 0, density = 0;
+      for (std::size_t i = 0; i < count_; ++i) {
+        const double rest = std::exp(-rate_[i] * t);
+        cumulative += (1 - rest) / reach_[i];
+        density += rate_[i] * rest / reach_[i];
+      }
+      const double above = cumulative - u * static_cast<double>(count_);
+      (above > 0 ? high : low) = t;
+      const double newton = t - above / density;
+      if (std::abs(newton - t) <= 1e-7 * t) break;
+      t = newton > low && newton < high ? newton : (low + high) / 2;
+    }
+    return std::min(t, limit_);
   }
-  float pdf(float t) const {
-    float sum = 0;
-    for (int c = 0; c < count_; ++c)
-      sum += rates_[c] * std::exp(-rates_[c] * t) / -std::expm1(-rates_[c] * limit_);
-    return sum / static_cast<float>(count_);
+  double pdf(double t) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < count_; ++i) sum += rate_[i] * std::exp(-rate_[i] * t) / reach_[i];
+    return sum / static_cast<double>(count_);
   }
 
  private:
-  float limit_;
-  float rates_[3] = {};
-  int count_ = 0;
+  void add(double rate) {
+    rate_[count_] = rate;
+    reach_[count_++] = -std::expm1(-rate * limit_);
+  }
+
+  double limit_;
+  std::array<double, 6> rate_{}, reach_{};  // reach: probability of a flight shorter than the limit
+  std::size_t count_ = 0;
 };
 
 }  // namespace
@@ -110,14 +138,14 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
   std::vector<Crossing> crossings;
   for (int i = 0; i < samples; ++i) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
-    const float distance = flight.sample(sobol_1d(index, hash_words(key, 0)));
+    const Vec3 u = sobol_3d(index, key);
+    const auto distance = static_cast<float>(flight.sample(double{u.x}));
     const InteriorPoint at = view.at(distance);
     Rgb arriving(0, 0, 0);
-    for (std::size_t light = 0; light < m.world.scene->lights.size(); ++light) {
-      const Vec2 u = sobol_2d(index, hash_words(key, 1 + light));
-      arriving += m.connect(at, inward, sample_light(m.world, light, at.position, u), crossings, lost);
-    }
-    const float pdf = flight.pdf(distance);
+    for (std::size_t light = 0; light < m.world.scene->lights.size(); ++light)
+      arriving +=
+          m.connect(at, inward, sample_light(m.world, light, at.position, {u.y, u.z}), crossings, lost);
+    const auto pdf = static_cast<float>(flight.pdf(double{distance}));
     for (int k = 0; k < 3; ++k)
       sum[k] += arriving[k] * m.sigma_s[k] * std::exp(-m.sigma_t[k] * distance) / pdf;
   }

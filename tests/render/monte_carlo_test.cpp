@@ -85,12 +85,22 @@ TEST(Plane, MeanIsTheTotalOfTheProfile) {
       const MonteCarloDiffusion diffusion(world, 0, sampling, 0);
       const SurfacePoint point = surface_point(world, world.tracer.intersect({{3.2f, 1.1f, 1}, {0, 0, -1}}));
       const auto profiles = make_profiles(medium);
-      const int count = sampling == MonteCarloSampling::kUniform ? 1 << 18 : 1 << 15;
-      const Rgb mean = diffusion.estimate(point, count, 5, 0);
+      // Its own noise, from independent groups of samples.
+      constexpr int kGroups = 32;
+      const int per_group = sampling == MonteCarloSampling::kUniform ? 1 << 16 : 1 << 12;
+      Vec3d sum(0, 0, 0), squares(0, 0, 0);
+      for (std::uint64_t group = 0; group < kGroups; ++group) {
+        const Vec3d value(diffusion.estimate(point, per_group, group, 0));
+        sum += value;
+        squares += value * value;
+      }
       const double transmitted = 1 - fresnel_reflectance(1.0, static_cast<double>(medium.eta()));
       for (int k = 0; k < 3; ++k) {
         const double expected = profiles[static_cast<std::size_t>(k)].total * transmitted * (k + 1);
-        EXPECT_NEAR(static_cast<double>(mean[k]) / expected, 1, 0.005)
+        const double mean = sum[k] / kGroups;
+        const double error = std::sqrt((squares[k] / kGroups - square(mean)) / (kGroups - 1));
+        EXPECT_LT(error, 0.005 * expected) << static_cast<int>(profile) << " " << static_cast<int>(sampling);
+        EXPECT_NEAR(mean / expected, 1, 0.001 + 3.5 * error / expected)
             << static_cast<int>(profile) << " " << static_cast<int>(sampling) << " " << k;
       }
     }
@@ -135,10 +145,10 @@ TEST(Blocks, AgreeWithTheHierarchicalSumWithinTheirNoise) {
          {MonteCarloSampling::kUniform, MonteCarloSampling::kExponential}) {
       params.method = Method::kMonteCarlo;
       params.mc_sampling = sampling;
-      params.mc_samples = 128;
+      params.mc_samples = 256;
       const Image slow = render_with(world, {}, params);
       int blocks = 0, outside = 0;
-      double squares = 0, worst = 0;
+      double squares = 0, worst = 0, signed_sum = 0, noise = 0;
       for (const char* name : {"diffusion.R", "diffusion.G", "diffusion.B"}) {
         const std::vector<float>& a = find_channel(fast, name)->values;
         const std::vector<float>& b = find_channel(slow, name)->values;
@@ -159,12 +169,16 @@ TEST(Blocks, AgreeWithTheHierarchicalSumWithinTheirNoise) {
             ++blocks;
             outside += deviation > 3;
             squares += square(deviation);
+            signed_sum += sum / kCount / sigma;
+            noise += sigma * kCount / light;
             worst = std::max(worst, deviation);
           }
       }
-      fmt::print("{}, {}: {} blocks, {} beyond 3 sigma, worst {:.2f}, mean square {:.2f}\n", subject.name,
-                 sampling == MonteCarloSampling::kUniform ? "uniform" : "exponential", blocks, outside, worst,
-                 squares / blocks);
+      fmt::print(
+          "{}, {}: {} blocks, {} beyond 3 sigma, worst {:.2f}, mean square {:.2f}, mean {:.2f}, noise {:.2f} "
+          "%\n",
+          subject.name, sampling == MonteCarloSampling::kUniform ? "uniform" : "exponential", blocks, outside,
+          worst, squares / blocks, signed_sum / blocks, 100 * noise / blocks);
       EXPECT_GE(blocks, 120) << subject.name;
       EXPECT_LE(outside, std::max(2, blocks / 100)) << subject.name;
       EXPECT_LT(worst, 4.5) << subject.name;

@@ -40,6 +40,9 @@ class Rng {
 /// give independent randomizations; every prefix of 2^k points is stratified in all elementary intervals.
 /// Source: Burley 2020, "Practical hash-based Owen scrambling".
 Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept;
+/// The same in three dimensions: each pair of coordinates, and all three together, are well distributed,
+/// though not in every elementary interval.
+Vec3 sobol_3d(std::uint32_t index, std::uint64_t scramble) noexcept;
 /// Point `index` of the scrambled van der Corput sequence, in [0,1).
 float sobol_1d(std::uint32_t index, std::uint64_t scramble) noexcept;
 
