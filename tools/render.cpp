@@ -252,7 +252,7 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->check(CLI::Range(0.0, 1.0));
   command
       ->add_option("--single-samples", options->single_samples,
-                   "Points of single scattering per camera sample (default: 1; 0: none)")
+                   "Points of single scattering per camera sample (default: 2; 0: none)")
       ->check(CLI::Range(0, 1 << 16));
   command
       ->add_option("--mc-samples", options->mc_samples,

@@ -34,7 +34,7 @@ struct RenderParams {
   int samples_per_pixel = 16;
   Method method = Method::kHierarchical;
   double tolerance = 0.01;
-  int single_samples = 1;  // points per camera sample, each connected to every light; 0: no single scattering
+  int single_samples = 2;  // points per camera sample, each connected to every light; 0: no single scattering
   int mc_samples = 64;     // kMonteCarlo: surface points per camera sample
   MonteCarloSampling mc_sampling = MonteCarloSampling::kExponential;
   // kMonteCarlo, kLambert: bounces of light before it enters; none: what the scene's integrator gives
