@@ -8,6 +8,17 @@ int Integrator::bounces() const {
   return max_depth < 0 ? kUnlimitedBounces : std::max(0, max_depth - 2);
 }
 
+bool is_delta(const Light& light) {
+  return std::holds_alternative<PointLight>(light.model) ||
+         std::holds_alternative<DirectionalLight>(light.model) ||
+         std::holds_alternative<SpotLight>(light.model);
+}
+
+bool is_environment(const Light& light) {
+  return std::holds_alternative<ConstantLight>(light.model) ||
+         std::holds_alternative<EnvironmentMap>(light.model);
+}
+
 std::string light_name(const Scene& scene, std::size_t light) {
   const std::string& id = scene.lights[light].id;
   return id.empty() ? fmt::format("light {}", light + 1) : id;
