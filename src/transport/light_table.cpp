@@ -52,16 +52,16 @@ struct Maker {
   }
 
   void operator()(const PointLight& point) {
-    add_near({Box3(point.position), mean(point.intensity), {0, 0, 1}, kPi, 0});
+    add_near({Box3(point.position), mean(point.intensity), {0, 0, 1}, kPi, 1});
   }
   void operator()(const SpotLight& spot) {
-    add_near({Box3(spot.position), mean(spot.intensity), spot.direction, spot.cutoff_angle * kPi / 180, 0});
+    add_near({Box3(spot.position), mean(spot.intensity), spot.direction, spot.cutoff_angle * kPi / 180, 1});
   }
   void operator()(const AreaLight& area) {
     const Mesh& mesh = scene.shapes[area.shape].mesh;
     table.triangles[light] = triangles_by_area(mesh, scene.lights[light].place);
     LightBound bound{
-        nacre::bounds(mesh), mean(area.radiance) * table.triangles[light].total(), {0, 0, 1}, kPi, kPi / 2};
+        nacre::bounds(mesh), mean(area.radiance) * table.triangles[light].total(), {0, 0, 1}, kPi, 0};
     bound_normals(mesh, bound);
     add_near(bound);
   }

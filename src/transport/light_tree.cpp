@@ -6,7 +6,7 @@
 namespace nacre {
 namespace {
 
-// Light at grazing angles counts at least this much, and angles are taken this much wider (radians), so that
+// Light at grazing angles counts at least this much, and cosines are taken this much larger, so that
 // rounding never rules out a light that can be seen.
 constexpr float kLeastCosine = 0.01f;
 constexpr float kSlack = 1e-3f;
@@ -38,8 +38,24 @@ LightBound merge(LightBound a, const LightBound& b) {
   a.box.extendBy(b.box);
   a.intensity += b.intensity;
   merge_cones(a, b);
-  a.beam_angle = std::max(a.beam_angle, b.beam_angle);
+  a.beam_cosine = std::min(a.beam_cosine, b.beam_cosine);
+  a.normal_cosine = std::cos(a.normal_angle);
+  a.normal_sine = std::sin(a.normal_angle);
   return a;
+}
+
+// By cosine and sine, which subtract without a call of either.
+struct Angle {
+  float cosine, sine;
+};
+Angle angle_of(float cosine) {
+  cosine = std::clamp(cosine, -1.0f, 1.0f);
+  return {cosine, std::sqrt(1 - cosine * cosine)};
+}
+// At least 0; both up to pi.
+Angle minus(const Angle& a, const Angle& b) {
+  if (a.cosine >= b.cosine) return {1, 0};
+  return {a.cosine * b.cosine + a.sine * b.sine, a.sine * b.cosine - a.cosine * b.sine};
 }
 
 double importance_of(const LightBound& bound, const Vec3& x, const Vec3& normal) {
@@ -53,15 +69,19 @@ double importance_of(const LightBound& bound, const Vec3& x, const Vec3& normal)
   const Vec3d direction = to_light / distance;
   const Vec3 d(static_cast<float>(direction.x), static_cast<float>(direction.y),
                static_cast<float>(direction.z));
-  const float spread = static_cast<float>(std::asin(radius / distance)) + kSlack;
-  const float leaving = angle_between(bound.axis, -d) - bound.normal_angle - spread;
-  if (leaving > bound.beam_angle) return 0;
+  const double sine = radius / distance;
+  const Angle spread{static_cast<float>(std::sqrt(1 - sine * sine)), static_cast<float>(sine)};
   float weight = 1;
-  if (leaving > 0 && bound.beam_angle >= kPi / 2) weight = std::max(std::cos(leaving), kLeastCosine);
+  if (bound.normal_angle < kPi) {
+    const Angle normals{bound.normal_cosine, bound.normal_sine};
+    const float leaving = minus(minus(angle_of(-dot(bound.axis, d)), normals), spread).cosine;
+    if (leaving < bound.beam_cosine - kSlack) return 0;
+    if (bound.beam_cosine <= 0) weight = std::max(leaving, kLeastCosine);
+  }
   if (normal != Vec3(0, 0, 0)) {
-    const float arriving = angle_between(normal, d) - spread;
-    if (arriving > kPi / 2) return 0;
-    if (arriving > 0) weight *= std::max(std::cos(arriving), kLeastCosine);
+    const float arriving = minus(angle_of(dot(normal, d)), spread).cosine;
+    if (arriving < -kSlack) return 0;
+    weight *= std::max(arriving, kLeastCosine);
   }
   return intensity * static_cast<double>(weight);
 }
@@ -82,7 +102,10 @@ std::uint32_t LightTree::build(std::span<std::uint32_t> items, std::span<const L
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   if (items.size() == 1) {
-    nodes_[index].bound = bounds[items[0]];
+    LightBound& bound = nodes_[index].bound;
+    bound = bounds[items[0]];
+    bound.normal_cosine = std::cos(bound.normal_angle);
+    bound.normal_sine = std::sin(bound.normal_angle);
     nodes_[index].light = static_cast<std::uint32_t>(lights[items[0]]);
     paths_[lights[items[0]]] = path;
     return index;

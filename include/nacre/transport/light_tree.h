@@ -15,8 +15,10 @@ struct LightBound {
   double intensity = 0;      // towards where it sends most, per steradian; mean of the channels
   Vec3 axis{0, 0, 1};        // mean of its normals
   float normal_angle = kPi;  // largest between a normal and the axis; pi: unknown
-  float beam_angle = 0;      // largest between light that leaves and the normal of where it leaves; with
-                             // pi/2 it fades like a cosine, below not at all
+  // Of the largest angle between light that leaves and the normal of where it leaves: with 0 it fades like a
+  // cosine, with more not at all.
+  float beam_cosine = 1;
+  float normal_cosine = -1, normal_sine = 0;  // of normal_angle; the tree sets them
 };
 
 struct LightChoice {
