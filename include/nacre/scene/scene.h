@@ -123,7 +123,7 @@ inline constexpr int kUnlimitedBounces = 1'000'000;
 enum class IntegratorKind { kDirect, kPath };
 struct Integrator {
   IntegratorKind kind = IntegratorKind::kDirect;
-  int emitter_samples = 1;  // connections to each light that is no point from every shaded point
+  int emitter_samples = 1;  // connections to each light with an extent from every shaded point
   int max_depth = -1;       // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen
                             // directly, 2 direct light
   /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) or
