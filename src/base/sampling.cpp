@@ -56,4 +56,20 @@ double Distribution::pdf(std::size_t index) const noexcept {
   return (cumulative_[index] - (index ? cumulative_[index - 1] : 0)) / total();
 }
 
+Distribution2D::Distribution2D(std::span<const double> weights, std::size_t width) {
+  std::vector<double> rows;
+  for (std::size_t begin = 0; begin < weights.size(); begin += width) {
+    columns_.emplace_back(weights.subspan(begin, width));
+    rows.push_back(columns_.back().total());
+  }
+  rows_ = Distribution(rows);
+}
+
+Distribution2D::Cell Distribution2D::sample(const Vec2& u) const noexcept {
+  Cell cell{0, 0, static_cast<double>(u.x), static_cast<double>(u.y)};
+  cell.y = rows_.sample(cell.dy);
+  cell.x = columns_[cell.y].sample(cell.dx);
+  return cell;
+}
+
 }  // namespace nacre

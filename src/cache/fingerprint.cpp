@@ -35,6 +35,14 @@ std::string hash_geometry(const Mesh& mesh, bool with_normals) {
   return digest(state);
 }
 
+std::string hash_picture(const Bitmap& picture) {
+  const HashState state = make_hash();
+  const int size[2] = {picture.width, picture.height};
+  XXH3_128bits_update(state.get(), size, sizeof size);
+  XXH3_128bits_update(state.get(), picture.texels.data(), picture.texels.size() * sizeof(Rgb));
+  return digest(state);
+}
+
 std::string text(const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); }
 
 class Fingerprinter {
@@ -59,6 +67,7 @@ class Fingerprinter {
           shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
       if (reflects) add_surface(name, shape);
     }
+    // How lights are chosen for sampling decides about noise alone.
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
       name_ = "light " + light_name(scene_, i);
       std::visit([&](const auto& light) { add_light(light); }, scene_.lights[i].model);
@@ -100,6 +109,19 @@ class Fingerprinter {
   void add_light(const DirectionalLight& light) {
     add(name_ + "/direction", text(light.direction));
     add(name_ + "/irradiance", text(light.irradiance));
+  }
+  void add_light(const SpotLight& light) {
+    add(name_ + "/position", text(light.position));
+    add(name_ + "/direction", text(light.direction));
+    add(name_ + "/intensity", text(light.intensity));
+    add(name_ + "/angles", fmt::format("{} {}", light.cutoff_angle, light.beam_width));
+  }
+  void add_light(const ConstantLight& light) { add(name_ + "/radiance", text(light.radiance)); }
+  void add_light(const EnvironmentMap& light) {
+    add(name_ + "/map", hash_picture(light.radiance));
+    const Matrix4& m = light.to_world;
+    add(name_ + "/rotation", fmt::format("{} {} {} {} {} {} {} {} {}", m[0][0], m[0][1], m[0][2], m[1][0],
+                                         m[1][1], m[1][2], m[2][0], m[2][1], m[2][2]));
   }
   void add_light(const AreaLight& light) {
     add(name_ + "/shape", scene_.shapes[light.shape].id);

@@ -142,9 +142,15 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
     const auto distance = static_cast<float>(flight.sample(double{u.x}));
     const InteriorPoint at = view.at(distance);
     Rgb arriving(0, 0, 0);
-    for (std::size_t light = 0; light < m.world.scene->lights.size(); ++light)
-      arriving +=
-          m.connect(at, inward, sample_light(m.world, light, at.position, {u.y, u.z}), crossings, lost);
+    const auto gather = [&](const Connection& connection) {
+      arriving += m.connect(at, inward, connection.sample, crossings, lost);
+    };
+    const std::size_t lights = m.world.scene->lights.size();
+    if (lights > kMaxConnectedLights)
+      for_each_connection(m.world, at.position, kNoNormal, 1, key, index, gather);
+    else  // the same point of every light: what it has to be spread evenly with is the distance
+      for (std::size_t light = 0; light < lights; ++light)
+        gather(connect_to_light(m.world, light, at.position, kNoNormal, {u.y, u.z}, 1));
     const auto pdf = static_cast<float>(flight.pdf(double{distance}));
     for (int k = 0; k < 3; ++k)
       sum[k] += arriving[k] * m.sigma_s[k] * std::exp(-m.sigma_t[k] * distance) / pdf;

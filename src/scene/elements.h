@@ -26,10 +26,10 @@ struct SensorElement {
 Surface read_surface(const XmlElement& element, Warnings& warnings);
 /// <subsurface>
 MediumElement read_medium(const XmlElement& element, Warnings& warnings);
-/// <emitter> directly inside <scene>: point or directional.
+/// <emitter> directly inside <scene>: every type but area.
 Light read_light(const XmlElement& element, Warnings& warnings);
-/// <emitter> inside a shape, of type area: its radiance.
-Rgb read_area_radiance(const XmlElement& element, Warnings& warnings);
+/// <emitter> inside shape `shape`, of type area.
+Light read_area_light(const XmlElement& element, std::uint32_t shape, Warnings& warnings);
 /// <sensor> with its film and sampler
 SensorElement read_sensor(const XmlElement& element, Warnings& warnings);
 /// <integrator>

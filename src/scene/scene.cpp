@@ -12,6 +12,17 @@ int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int
   return asked.value_or(scene.subsurface[medium].indirect ? scene.integrator.bounces() : 0);
 }
 
+bool is_delta(const Light& light) {
+  return std::holds_alternative<PointLight>(light.model) ||
+         std::holds_alternative<DirectionalLight>(light.model) ||
+         std::holds_alternative<SpotLight>(light.model);
+}
+
+bool is_environment(const Light& light) {
+  return std::holds_alternative<ConstantLight>(light.model) ||
+         std::holds_alternative<EnvironmentMap>(light.model);
+}
+
 std::string light_name(const Scene& scene, std::size_t light) {
   const std::string& id = scene.lights[light].id;
   return id.empty() ? fmt::format("light {}", light + 1) : id;

@@ -23,6 +23,7 @@ class Builder {
  private:
   void collect_ids(const XmlElement& element);
   void add_element(const XmlElement& element);
+  void add_light(Light light);
   void add_sensor(const XmlElement& element);
   void add_shape(const XmlElement& element);
   void add_default_camera();
@@ -81,7 +82,7 @@ void Builder::add_element(const XmlElement& element) {
   if (element.tag == "shape") {
     add_shape(element);
   } else if (element.tag == "emitter") {
-    scene_.lights.push_back(read_light(element, scene_.warnings));
+    add_light(read_light(element, scene_.warnings));
   } else if (element.tag == "sensor") {
     add_sensor(element);
   } else if (element.tag == "integrator") {
@@ -89,6 +90,15 @@ void Builder::add_element(const XmlElement& element) {
     has_integrator_ = true;
     scene_.integrator = read_integrator(element, scene_.warnings);
   }
+}
+
+void Builder::add_light(Light light) {
+  if (is_environment(light)) {
+    const auto first = std::ranges::find_if(scene_.lights, is_environment);
+    if (first != scene_.lights.end())
+      fail(ErrorCode::kValue, light.place, "a second light all around; the first is at {}", first->place);
+  }
+  scene_.lights.push_back(std::move(light));
 }
 
 void Builder::add_sensor(const XmlElement& element) {
@@ -150,8 +160,8 @@ void Builder::add_shape(const XmlElement& element) {
       shape.medium = medium_index(target);
     } else if (target.tag == "emitter" && &target == &child) {
       set_once(light.has_value());
-      light = Light{child.has("id") ? child.get("id") : element.get("id"), child.place(),
-                    AreaLight{static_cast<std::uint32_t>(index), read_area_radiance(child, scene_.warnings)}};
+      light = read_area_light(child, static_cast<std::uint32_t>(index), scene_.warnings);
+      if (light->id.empty()) light->id = element.get("id");
     } else if (child.tag == "ref") {
       fail(ErrorCode::kUnsupported, child.place(),
            "'{}' is {} <{}>; a shape can refer to a <bsdf> or a <subsurface>", child.get("id"),

@@ -12,18 +12,13 @@ namespace {
 Rgb direct_irradiance(const World& world, const Receiver& at, int samples, std::uint64_t key,
                       std::uint32_t first_sample) {
   Rgb sum(0, 0, 0);
-  for (std::size_t light = 0; light < world.scene->lights.size(); ++light) {
-    const int count = std::holds_alternative<AreaLight>(world.scene->lights[light].model) ? samples : 1;
-    Rgb of_light(0, 0, 0);
-    for (int s = 0; s < count; ++s) {
-      const Vec2 u = sobol_2d(first_sample + static_cast<std::uint32_t>(s), hash_words(key, light));
-      const LightSample sample = sample_light(world, light, at.position, u);
-      const float cosine = dot(sample.direction, at.normal);
-      if (cosine <= 0 || is_black(sample.irradiance) || !is_visible(world, at.origin, sample)) continue;
-      of_light += sample.irradiance * (cosine * (1 - fresnel_reflectance(cosine, at.eta)));
-    }
-    sum += of_light / static_cast<float>(count);
-  }
+  for_each_connection(
+      world, at.position, at.normal, samples, key, first_sample, [&](const Connection& connection) {
+        const LightSample& sample = connection.sample;
+        const float cosine = dot(sample.direction, at.normal);
+        if (cosine > 0 && is_visible(world, at.origin, sample))
+          sum += sample.irradiance * (cosine * (1 - fresnel_reflectance(std::min(cosine, 1.0f), at.eta)));
+      });
   return sum;
 }
 

@@ -3,50 +3,128 @@
 
 #include <limits>
 
-#include "nacre/base/random.h"
-
 namespace nacre {
 namespace {
 
-LightSample sample_model(const World&, const Distribution&, const PointLight& light, const Vec3& x,
-                         const Vec2&) {
-  const Vec3 to_light = light.position - x;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Least and largest share of the choices that lights infinitely far away get beside others: how much of
+// either a point really sees is not known.
+constexpr double kLeastShare = 0.1;
+
+// What sampling a light depends on.
+struct Query {
+  const World& world;
+  std::size_t light;
+  const Vec3& x;
+  const Vec3& normal;
+  const Vec2& u;
+};
+
+LightSample sample_intensity(const Vec3& position, const Vec3& x, const Rgb& intensity) {
+  const Vec3 to_light = position - x;
   const float distance2 = to_light.length2();
   if (!(distance2 > 0)) return {};
   const float distance = std::sqrt(distance2);
-  return {to_light / distance, distance, light.position, light.intensity / distance2};
+  return {to_light / distance, distance, position, intensity / distance2};
 }
 
-LightSample sample_model(const World&, const Distribution&, const DirectionalLight& light, const Vec3&,
-                         const Vec2&) {
-  return {-light.direction, std::numeric_limits<float>::infinity(), {}, light.irradiance};
+LightSample sample_model(const Query& query, const PointLight& light) {
+  return sample_intensity(light.position, query.x, light.intensity);
 }
 
-LightSample sample_model(const World& world, const Distribution& triangles, const AreaLight& light,
-                         const Vec3& x, const Vec2& u) {
-  const Mesh& mesh = world.scene->shapes[light.shape].mesh;
-  double choice = u.x;
+LightSample sample_model(const Query& query, const SpotLight& light) {
+  LightSample sample = sample_intensity(light.position, query.x, light.intensity);
+  if (is_black(sample.irradiance)) return {};
+  // By the angle's tangent: its cosine cannot tell small angles apart.
+  const float along = -dot(sample.direction, light.direction);
+  const float across = cross(sample.direction, light.direction).length();
+  const float angle = std::atan2(across, along) * (180 / kPi);
+  if (angle >= light.cutoff_angle) return {};
+  if (angle > light.beam_width)
+    sample.irradiance *= (light.cutoff_angle - angle) / (light.cutoff_angle - light.beam_width);
+  return sample;
+}
+
+LightSample sample_model(const Query&, const DirectionalLight& light) {
+  return {-light.direction, kInfinity, {}, light.irradiance};
+}
+
+float pdf_constant(const Vec3& direction, const Vec3& normal) {
+  return normal == kNoNormal ? 1 / (4 * kPi) : pdf_cosine_hemisphere(dot(direction, normal));
+}
+
+LightSample sample_model(const Query& query, const ConstantLight& light) {
+  const Vec3 direction = query.normal == kNoNormal
+                             ? sample_uniform_sphere(query.u)
+                             : make_frame(query.normal).to_world(sample_cosine_hemisphere(query.u));
+  const float pdf = pdf_constant(direction, query.normal);
+  if (!(pdf > 0)) return {};
+  return {direction, kInfinity, {}, light.radiance / pdf, pdf};
+}
+
+LightSample sample_model(const Query& query, const EnvironmentMap&) {
+  const Environment& map = *query.world.lights.map;
+  float pdf = 0;
+  const Vec3 direction = map.sample(query.u, pdf);
+  if (!(pdf > 0)) return {};
+  return {direction, kInfinity, {}, map.radiance(direction) / pdf, pdf};
+}
+
+// Per steradian at x for points uniform by area; 0 from behind. Distances reach where their cubes overflow
+// single precision.
+float pdf_of_area(const Vec3& x, const Vec3& p, const Vec3& normal, double area) {
+  const Vec3d to_light = Vec3d(p) - Vec3d(x);
+  const double facing = -to_light.dot(Vec3d(normal)),
+               distance2 = to_light.length2();  // facing: times the distance
+  if (!(facing > 0)) return 0;
+  const double pdf = distance2 * std::sqrt(distance2) / (facing * area);
+  return pdf < std::numeric_limits<float>::max() ? static_cast<float>(pdf) : 0;
+}
+
+LightSample sample_model(const Query& query, const AreaLight& light) {
+  const Mesh& mesh = query.world.scene->shapes[light.shape].mesh;
+  const Distribution& triangles = query.world.lights.triangles[query.light];
+  double choice = static_cast<double>(query.u.x);
   const std::size_t triangle = triangles.sample(choice);
-  const Vec2 b = sample_uniform_triangle({static_cast<float>(choice), u.y});
+  const Vec2 b = sample_uniform_triangle({static_cast<float>(choice), query.u.y});
   const Triangle& t = mesh.triangles[triangle];
   const Vec3& p0 = mesh.positions[t[0]];
   const Vec3 p = p0 + (mesh.positions[t[1]] - p0) * b.x + (mesh.positions[t[2]] - p0) * b.y;
-  const Vec3 to_light = p - x;
-  const float distance2 = to_light.length2();
-  const Vec3 normal = face_normal(mesh, triangle);
-  const float facing = -dot(to_light, normal);  // times the distance
-  if (!(distance2 > 0) || !(facing > 0)) return {};
-  const float distance = std::sqrt(distance2);
-  return {to_light / distance, distance, p,
-          light.radiance * (facing / distance / distance2 * static_cast<float>(triangles.total()))};
+  const float pdf = pdf_of_area(query.x, p, face_normal(mesh, triangle), triangles.total());
+  if (!(pdf > 0)) return {};
+  const Vec3 to_light = p - query.x;
+  const float distance = to_light.length();
+  return {to_light / distance, distance, p, light.radiance / pdf, pdf};
 }
 
 }  // namespace
 
-LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u) noexcept {
-  return std::visit(
-      [&](const auto& model) { return sample_model(world, world.emitters[light], model, x, u); },
-      world.scene->lights[light].model);
+LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u,
+                         const Vec3& normal) noexcept {
+  const Query query{world, light, x, normal, u};
+  return std::visit([&](const auto& model) { return sample_model(query, model); },
+                    world.scene->lights[light].model);
+}
+
+float pdf_light(const World& world, std::size_t light, const Vec3& x, const Hit& hit) noexcept {
+  const auto* area = std::get_if<AreaLight>(&world.scene->lights[light].model);
+  if (!area || !hit || hit.mesh != area->shape) return 0;
+  const Mesh& mesh = world.shape(hit).mesh;
+  return pdf_of_area(x, hit_position(mesh, hit), face_normal(mesh, hit.triangle),
+                     world.lights.triangles[light].total());
+}
+
+float pdf_light(const World& world, std::size_t light, const Vec3&, const Vec3& direction,
+                const Vec3& normal) noexcept {
+  if (light != world.lights.environment) return 0;
+  return world.lights.map ? world.lights.map->pdf(direction) : pdf_constant(direction, normal);
+}
+
+Rgb environment_radiance(const World& world, const Vec3& direction) noexcept {
+  if (world.lights.environment == kNoLight) return {0, 0, 0};
+  if (world.lights.map) return world.lights.map->radiance(direction);
+  return std::get<ConstantLight>(world.scene->lights[world.lights.environment].model).radiance;
 }
 
 bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
@@ -58,27 +136,87 @@ bool is_visible(const World& world, const Vec3& origin, const LightSample& sampl
   return !world.tracer.occluded({origin, sample.point - origin, 0, kReach});
 }
 
+namespace {
+
+// The share of the choices at x that lights infinitely far away get.
+double distant_share(const LightTable& lights, const Vec3& x, const Vec3& normal) {
+  const double distant = lights.distant_irradiance.total();
+  if (!(distant > 0)) return 0;
+  const double near = lights.near.importance(x, normal);
+  if (!(near > 0)) return 1;
+  return std::clamp(distant / (distant + near), kLeastShare, 1 - kLeastShare);
+}
+
+}  // namespace
+
+LightChoice choose_light(const World& world, const Vec3& x, double u, const Vec3& normal) noexcept {
+  const LightTable& lights = world.lights;
+  const double share = distant_share(lights, x, normal);
+  if (u < share) {
+    u = std::min(u / share, 1 - 0x1p-53);
+    const std::size_t at = lights.distant_irradiance.sample(u);
+    return {lights.distant[at], share * lights.distant_irradiance.pdf(at)};
+  }
+  LightChoice choice = lights.near.choose(x, normal, (u - share) / (1 - share));
+  choice.probability *= 1 - share;
+  return choice;
+}
+
+double probability_of_light(const World& world, const Vec3& x, std::size_t light,
+                            const Vec3& normal) noexcept {
+  const LightTable& lights = world.lights;
+  const double share = distant_share(lights, x, normal);
+  const auto found = std::ranges::lower_bound(lights.distant, light);
+  if (found != lights.distant.end() && *found == light)
+    return share > 0
+               ? share *
+                     lights.distant_irradiance.pdf(static_cast<std::size_t>(found - lights.distant.begin()))
+               : 0;
+  return (1 - share) * lights.near.probability(light, x, normal);
+}
+
+float expected_connections(const World& world, std::size_t light, const Vec3& x, const Vec3& normal,
+                           int samples) noexcept {
+  if (world.scene->lights.size() <= kMaxConnectedLights)
+    return is_delta(world.scene->lights[light]) ? 1 : static_cast<float>(samples);
+  return static_cast<float>(samples * static_cast<double>(kMaxConnectedLights) *
+                            probability_of_light(world, x, light, normal));
+}
+
+Connection connect_to_light(const World& world, std::size_t light, const Vec3& x, const Vec3& normal,
+                            const Vec2& u, float connections) noexcept {
+  Connection connection{light, sample_light(world, light, x, u, normal), 0};
+  connection.sample.irradiance /= connections;
+  connection.density = connection.sample.pdf * connections;
+  return connection;
+}
+
+Connection connect_to_chosen_light(const World& world, const Vec3& x, const Vec3& normal, int samples,
+                                   std::uint64_t key, std::uint32_t index) noexcept {
+  // Unlikely lights are further apart than the steps of single precision.
+  const double fine = to_unit_double(hash_words(key, 2, index)) * 0x1p-24;
+  const double u = std::min(static_cast<double>(sobol_1d(index, hash_words(key, 1))) + fine, 1 - 0x1p-53);
+  const LightChoice choice = choose_light(world, x, u, normal);
+  if (!(choice.probability > 0)) return {};
+  return connect_to_light(
+      world, choice.light, x, normal, sobol_2d(index, hash_words(key, 3)),
+      static_cast<float>(samples * static_cast<double>(kMaxConnectedLights) * choice.probability));
+}
+
 Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
                          int samples, std::uint64_t key, std::uint32_t first_sample) noexcept {
   Rgb sum(0, 0, 0);
   const float cos_o = dot(point.shading_normal, out);
   if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) return sum;
   const Vec3 origin = point.origin(1);
-  for (std::size_t light = 0; light < world.scene->lights.size(); ++light) {
-    const bool sampled = std::holds_alternative<AreaLight>(world.scene->lights[light].model);
-    const int count = sampled ? samples : 1;
-    Rgb of_light(0, 0, 0);
-    for (int s = 0; s < count; ++s) {
-      const Vec2 u = sobol_2d(first_sample + static_cast<std::uint32_t>(s), hash_words(key, light));
-      const LightSample sample = sample_light(world, light, point.position, u);
-      const float cos_i = dot(point.shading_normal, sample.direction);
-      if (is_black(sample.irradiance) || cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0)
-        continue;
-      if (is_visible(world, origin, sample))
-        of_light += eval_diffuse(bsdf, cos_i, cos_o) * sample.irradiance * cos_i;
-    }
-    sum += of_light / static_cast<float>(count);
-  }
+  for_each_connection(world, point.position, point.shading_normal, samples, key, first_sample,
+                      [&](const Connection& connection) {
+                        const LightSample& sample = connection.sample;
+                        const float cos_i = dot(point.shading_normal, sample.direction);
+                        if (cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0) return;
+                        if (is_visible(world, origin, sample))
+                          sum += eval_diffuse(bsdf, cos_i, cos_o) * sample.irradiance * cos_i;
+                      });
   return sum;
 }
 

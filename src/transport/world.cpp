@@ -8,20 +8,11 @@ namespace nacre {
 World make_world(const Scene& scene, bool shadows) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  World world{&scene, RayTracer(meshes), {}, {}, shadows};
+  World world{&scene, RayTracer(meshes), {}, make_light_table(scene), shadows};
   for (const Shape& shape : scene.shapes)
     world.bsdfs.push_back(
         make_bsdf(shape.surface == kNone ? nullptr : &scene.surfaces[static_cast<std::size_t>(shape.surface)],
                   shape.medium == kNone ? nullptr : &scene.media[static_cast<std::size_t>(shape.medium)]));
-  for (const Light& light : scene.lights) {
-    Distribution triangles;
-    if (const auto* area = std::get_if<AreaLight>(&light.model)) {
-      triangles = Distribution(triangle_areas(scene.shapes[area->shape].mesh));
-      if (!(triangles.total() > 0))
-        fail(ErrorCode::kValue, light.place, "this light's shape has no area; remove it");
-    }
-    world.emitters.push_back(std::move(triangles));
-  }
   return world;
 }
 

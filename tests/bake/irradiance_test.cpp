@@ -166,6 +166,62 @@ TEST(Irradiance, HalfHiddenAreaLight) {
              rectangle_quadrature(0.25, 0.5, -0.25, 0, 2), 5e-3);
 }
 
+// Light all around: what enters is the mean transmittance of pi L, without noise, for a constant one.
+TEST(Irradiance, ConstantLight) {
+  Scene scene;
+  add_constant_light(scene, kSpectrum);
+  const double expected = kPiD * mean_transmittance(static_cast<double>(kEta));
+  expect_rgb(irradiance_at(scene, {1, 2, 3}, Vec3(0.6f, 0, 0.8f), 1024), kSpectrum, expected, 1e-3);
+  expect_rgb(irradiance_at(scene, {1, 2, 3}, -kUp, 16, 0, true, 1024), kSpectrum, expected, 1e-3);
+  // Half of the sky is behind a wall that is all but infinite.
+  Mesh wall = placed(make_rectangle(), 1e5f, Vec3(0));
+  for (Vec3& p : wall.positions) p = {1e-3f, p.x, p.y};
+  add_shape(scene, wall);
+  expect_rgb(irradiance_at(scene, Vec3(0), kUp, 1 << 14), kSpectrum, expected / 2, 5e-3);
+}
+
+TEST(Irradiance, EvenEnvironmentMapIsAConstantLight) {
+  Scene scene;
+  EnvironmentMap map;
+  map.radiance = {8, 4, std::vector<Rgb>(32, kSpectrum)};
+  scene.lights.push_back({"", "", map});
+  const double expected = kPiD * mean_transmittance(static_cast<double>(kEta));
+  for (const Vec3& normal : {Vec3(0, 0, 1), Vec3(0, -1, 0), Vec3(0.6f, 0.48f, -0.64f)})
+    expect_rgb(irradiance_at(scene, Vec3(0), normal, 1 << 16), kSpectrum, expected, 2e-3);
+}
+
+TEST(Irradiance, SpotLight) {
+  Scene scene;
+  SpotLight spot;
+  spot.position = {0, 0, 2};
+  spot.direction = {0, 0, -1};
+  spot.intensity = kSpectrum;
+  scene.lights.push_back({"", "", spot});
+  for (const auto& [degrees, part] : {std::pair{0.0, 1.0}, {14.9, 1.0}, {17.5, 0.5}, {19.0, 0.2}}) {
+    const double cosine = std::cos(degrees * kPiD / 180), distance2 = square(2 / cosine);
+    const Vec3 at(static_cast<float>(2 * std::tan(degrees * kPiD / 180)), 0, 0);
+    expect_rgb(irradiance_at(scene, at, kUp), kSpectrum, part * cosine * transmittance(cosine) / distance2,
+               1e-3);
+  }
+  EXPECT_TRUE(is_black(irradiance_at(scene, {0.74f, 0, 0}, kUp)));
+  EXPECT_TRUE(is_black(irradiance_at(scene, {0, 0, 4}, -kUp)));
+}
+
+// More lights than are all connected to.
+TEST(Irradiance, OfManyLightsIsTheirSum) {
+  Scene scene;
+  double expected = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 p(static_cast<float>(i % 7) - 3, static_cast<float>(i % 5) - 2,
+                 1 + 0.1f * static_cast<float>(i));
+    add_point_light(scene, p, kSpectrum);
+    const double distance = static_cast<double>(p.length()), cosine = static_cast<double>(p.z) / distance;
+    expected += cosine * transmittance(cosine) / square(distance);
+  }
+  expect_rgb(irradiance_at(scene, Vec3(0), kUp, 1 << 12), kSpectrum, expected, 3e-3);
+  expect_rgb(irradiance_at(scene, Vec3(0), kUp, 1, 0, true, 1 << 12), kSpectrum, expected, 1e-2);
+}
+
 // A sample on a closed translucent shape is not in the shadow of the triangle that it lies on.
 TEST(Irradiance, SurfacesDoNotShadowThemselves) {
   Scene scene;

@@ -203,5 +203,27 @@ TEST(MakeFrame, IsOrthonormal) {
   }
 }
 
+TEST(Distribution2D, SamplesCellsByWeight) {
+  const std::vector<double> weights{0, 3, 1, 0, 0, 0, 2, 0, 4};
+  const Distribution2D cells(weights, 3);
+  EXPECT_EQ(cells.total(), 10);
+  std::vector<double> counts(9), expected(9);
+  Rng rng(1);
+  double dx = 0, dy = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const Distribution2D::Cell cell = cells.sample(rng.next_2d());
+    ++counts[3 * cell.y + cell.x];
+    dx += cell.dx / kSamples;
+    dy += cell.dy / kSamples;
+  }
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_NEAR(cells.pdf(i % 3, i / 3), weights[i] / 10, 1e-15);
+    expected[i] = weights[i] / 10 * kSamples;
+  }
+  EXPECT_GT(chi_square_p(counts, expected), kSignificance);
+  EXPECT_NEAR(dx, 0.5, 5e-3);
+  EXPECT_NEAR(dy, 0.5, 5e-3);
+}
+
 }  // namespace
 }  // namespace nacre

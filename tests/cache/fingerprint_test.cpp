@@ -82,6 +82,44 @@ TEST(Fingerprint, NamesALightThatMoved) {
             "light glow/radiance was 5 5 5 and is 5 5 0.1");
 }
 
+TEST(Fingerprint, CountsEveryNumberOfLightsAllAroundAndSpots) {
+  const auto of = [](auto model) {
+    Scene scene = make_scene();
+    scene.lights.push_back({"new", "", std::move(model)});
+    return fingerprint(scene);
+  };
+  const auto differ = [&](const auto& model, const auto& change) {
+    auto changed = model;
+    change(changed);
+    return describe_mismatch(of(model), of(changed));
+  };
+  SpotLight spot{{1, 2, 3}, {0, 0, 1}, {4, 5, 6}};
+  EXPECT_EQ(differ(spot, [](SpotLight& s) { s.position.x = 0; }),
+            "light new/position was 1 2 3 and is 0 2 3");
+  EXPECT_EQ(differ(spot,
+                   [](SpotLight& s) {
+                     s.direction = {0, 1, 0};
+                   }),
+            "light new/direction was 0 0 1 and is 0 1 0");
+  EXPECT_EQ(differ(spot, [](SpotLight& s) { s.intensity.z = 0; }),
+            "light new/intensity was 4 5 6 and is 4 5 0");
+  EXPECT_EQ(differ(spot, [](SpotLight& s) { s.cutoff_angle = 21; }),
+            "light new/angles was 20 15 and is 21 15");
+  EXPECT_EQ(differ(spot, [](SpotLight& s) { s.beam_width = 14; }), "light new/angles was 20 15 and is 20 14");
+  EXPECT_EQ(differ(ConstantLight{{1, 1, 1}}, [](ConstantLight& c) { c.radiance.y = 2; }),
+            "light new/radiance was 1 1 1 and is 1 2 1");
+  const EnvironmentMap map{{2, 1, {{1, 1, 1}, {2, 2, 2}}}, {}};
+  EXPECT_EQ(differ(map, [](EnvironmentMap&) {}), "");
+  EXPECT_NE(differ(map, [](EnvironmentMap& m) { m.radiance.texels[1].z = 3; }), "");
+  EXPECT_NE(differ(map, [](EnvironmentMap& m) { std::swap(m.radiance.width, m.radiance.height); }), "");
+  EXPECT_NE(differ(map, [](EnvironmentMap& m) { m.to_world.rotate(Imath::V3d(0, 1e-3, 0)); }), "");
+}
+
+// How it is sampled changes noise, not what a cache is of.
+TEST(Fingerprint, IgnoresSamplingWeights) {
+  EXPECT_EQ(mismatch([](Scene& s) { s.lights[0].sampling_weight = 3; }), "");
+}
+
 // The smallest change that a float can hold counts.
 TEST(Fingerprint, SeesTheLastBit) {
   EXPECT_NE(mismatch([](Scene& s) {

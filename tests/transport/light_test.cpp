@@ -143,6 +143,48 @@ TEST(Light, DirectlyReflectedFromAFloor) {
   EXPECT_TRUE(is_black(reflect_direct_light(world, world.bsdfs[0], point, {0, 0, -1}, 4, 1, 0)));
 }
 
+// Under an even sky the albedo is what comes back, and nothing of it is noise.
+TEST(Light, ReflectedSky) {
+  Scene scene;
+  const Rgb albedo(0.6f, 0.3f, 0.9f);
+  add_shape(scene, placed(make_rectangle(), 10, Vec3(0)), add_diffuse(scene, albedo));
+  add_constant_light(scene, Rgb(2, 2, 2));
+  const World world = make_world(scene, true);
+  const SurfacePoint point = surface_point(world, world.tracer.intersect({{0.1f, 0.2f, 3}, {0, 0, -1}}));
+  const Rgb radiance = reflect_direct_light(world, world.bsdfs[0], point, {0, 0.6f, 0.8f}, 1, 1, 0);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(radiance[k], albedo[k] * 2, 1e-5);
+}
+
+TEST(Light, SpotFadesBetweenItsAngles) {
+  Scene scene;
+  SpotLight spot{{0, 0, 4}, {0, 0, -1}, Rgb(32, 16, 8)};
+  scene.lights.push_back({"", "", spot});
+  const World world = make_world(scene, true);
+  EXPECT_EQ(sample_light(world, 0, Vec3(0), {}).irradiance, Rgb(2, 1, 0.5f));
+  EXPECT_EQ(sample_light(world, 0, Vec3(0), {}).pdf, 0);
+  const auto at = [&](double degrees) {
+    const double angle = degrees * kPiD / 180;
+    return sample_light(world, 0,
+                        {static_cast<float>(std::sin(angle)), 0, static_cast<float>(4 - std::cos(angle))}, {})
+        .irradiance.x;
+  };
+  EXPECT_NEAR(at(14.99), 32, 1e-3);
+  EXPECT_NEAR(at(16), 32 * 0.8, 1e-3);
+  EXPECT_NEAR(at(19), 32 * 0.2, 1e-3);
+  EXPECT_EQ(at(20.01), 0);
+  EXPECT_EQ(at(180), 0);
+}
+
+// Light from far beyond where cubes of distances are numbers in single precision.
+TEST(Light, FarAndTinyAreaLightsGiveNumbers) {
+  for (const float scale : {1e-12f, 1e9f}) {
+    Scene scene;
+    add_area_light(scene, placed(flipped(make_rectangle()), scale, {0, 0, 2 * scale}), Rgb(1, 1, 1));
+    const World world = make_world(scene, true);
+    EXPECT_NEAR(integrate(world, Vec3(0), [](const Vec3& d) { return d.z; }), 0.75227, 2e-3) << scale;
+  }
+}
+
 TEST(Light, BouncedLightMissesAndStops) {
   Scene scene;
   add_shape(scene, make_rectangle(), add_diffuse(scene, Rgb(0.5f, 0.5f, 0.5f)));

@@ -50,6 +50,10 @@ inline void add_directional_light(Scene& scene, const Vec3& direction, const Rgb
   scene.lights.push_back({"", "", DirectionalLight{direction.normalized(), irradiance}});
 }
 
+inline void add_constant_light(Scene& scene, const Rgb& radiance) {
+  scene.lights.push_back({"", "", ConstantLight{radiance}});
+}
+
 inline int add_medium(Scene& scene, const Medium& medium) {
   scene.media.push_back(medium);
   scene.subsurface.emplace_back();

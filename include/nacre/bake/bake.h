@@ -58,7 +58,8 @@ struct ReceiverPoints {
 };
 
 /// Irradiance E_t transmitted at points into a medium of relative index eta, from every light with `samples`
-/// connections to each area light and, with bounces, `samples` rays for light off opaque surfaces.
+/// connections to each light that has an extent and, with bounces, `samples` rays for light off opaque
+/// surfaces.
 std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
                                     int bounces, std::uint64_t seed, Progress& progress);
 

@@ -46,4 +46,27 @@ class Distribution {
   std::vector<double> cumulative_;
 };
 
+/// A discrete distribution over the cells of a grid.
+class Distribution2D {
+ public:
+  struct Cell {
+    std::size_t x, y;
+    double dx, dy;  // position inside the cell, uniform in [0, 1)
+  };
+  Distribution2D() = default;
+  /// Weights, not negative, row by row of `width` cells.
+  Distribution2D(std::span<const double> weights, std::size_t width);
+  double total() const noexcept { return rows_.total(); }
+  /// A cell chosen with probability weight / total; never one of zero weight. total() must not be zero.
+  Cell sample(const Vec2& u) const noexcept;
+  /// Probability of a cell.
+  double pdf(std::size_t x, std::size_t y) const noexcept {
+    return columns_[y].total() > 0 ? rows_.pdf(y) * columns_[y].pdf(x) : 0;
+  }
+
+ private:
+  Distribution rows_;
+  std::vector<Distribution> columns_;  // of each row
+};
+
 }  // namespace nacre

@@ -12,6 +12,7 @@
 #include "nacre/base/math.h"
 #include "nacre/geometry/mesh.h"
 #include "nacre/optics/medium.h"
+#include "nacre/scene/bitmap.h"
 
 namespace nacre {
 
@@ -51,6 +52,25 @@ struct DirectionalLight {
   Vec3 direction;  // of travel, unit length
   Rgb irradiance;  // perpendicular to it
 };
+/// A point that sends `intensity` into the directions less than beam_width from its axis, and from there to
+/// cutoff_angle ever less, in proportion to the angle that is left.
+struct SpotLight {
+  Vec3 position;
+  Vec3 direction;                            // of its axis, unit length
+  Rgb intensity;                             // per steradian
+  float cutoff_angle = 20, beam_width = 15;  // degrees from the axis
+};
+/// The same radiance from every direction, infinitely far away.
+struct ConstantLight {
+  Rgb radiance;
+};
+/// Radiance from infinitely far away by direction: a picture of all directions. In its own space +y is the
+/// upper edge, -z the left and the right one, +z the middle and +x a quarter from the left. Bilinear between
+/// the texels' centres.
+struct EnvironmentMap {
+  Bitmap radiance;   // its scale included
+  Matrix4 to_world;  // orthonormal; may mirror
+};
 /// Every point of a shape's front side emits.
 struct AreaLight {
   std::uint32_t shape;  // index into Scene::shapes
@@ -58,8 +78,13 @@ struct AreaLight {
 };
 struct Light {
   std::string id, place;
-  std::variant<PointLight, DirectionalLight, AreaLight> model;
+  std::variant<PointLight, DirectionalLight, AreaLight, SpotLight, ConstantLight, EnvironmentMap> model;
+  float sampling_weight = 1;  // times the probability to be chosen, where lights are chosen
 };
+/// Whether light arrives from a single direction.
+bool is_delta(const Light& light);
+/// Whether it is a constant light or an environment map, of which a scene has at most one.
+bool is_environment(const Light& light);
 
 inline constexpr int kNone = -1;
 
@@ -99,7 +124,7 @@ inline constexpr int kUnlimitedBounces = 1'000'000;
 enum class IntegratorKind { kDirect, kPath };
 struct Integrator {
   IntegratorKind kind = IntegratorKind::kDirect;
-  int emitter_samples = 1;  // connections to each area light from every shaded point
+  int emitter_samples = 1;  // connections to each light with an extent from every shaded point
   int max_depth = -1;       // kPath: longest path in edges, camera to light; -1: no limit. 1 is emission seen
                             // directly, 2 direct light
   /// Bounces of surface light that reach a translucent surface: 1 for direct, max_depth - 2 (at least 0) or

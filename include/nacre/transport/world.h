@@ -3,19 +3,19 @@
 
 #include <vector>
 
-#include "nacre/base/sampling.h"
 #include "nacre/geometry/ray_tracer.h"
 #include "nacre/scene/scene.h"
 #include "nacre/transport/bsdf.h"
+#include "nacre/transport/light_table.h"
 
 namespace nacre {
 
 /// Everything that tracing light needs. The scene has to outlive it unchanged.
 struct World {
   const Scene* scene;
-  RayTracer tracer;                    // mesh i is Scene::shapes[i]
-  std::vector<Bsdf> bsdfs;             // parallel to Scene::shapes
-  std::vector<Distribution> emitters;  // parallel to Scene::lights: triangles of area lights by area
+  RayTracer tracer;         // mesh i is Scene::shapes[i]
+  std::vector<Bsdf> bsdfs;  // parallel to Scene::shapes
+  LightTable lights;
   bool shadows = true;
 
   const Shape& shape(const Hit& hit) const { return scene->shapes[hit.mesh]; }
