@@ -16,10 +16,10 @@
 #include <exception>
 #include <fstream>
 
+#include "base/exr_header.h"
 #include "nacre/base/file.h"
 #include "nacre/base/parallel.h"
 #include "nacre/render/image_file.h"
-#include "render/exr_header.h"
 #include "render/image_check.h"
 
 namespace nacre {

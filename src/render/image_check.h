@@ -3,12 +3,10 @@
 
 #include <string>
 
+#include "base/exr_header.h"
 #include "nacre/render/image_file.h"
 
 namespace nacre {
-
-/// Most pixels of an image that is written or read.
-inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 
 /// Throws Error: kLimit for more than kMaxImagePixels; kValue for an empty window, no channels, a channel
 /// without a name, twice or of the wrong size, and any value that is NaN or infinite.

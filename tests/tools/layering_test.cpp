@@ -36,12 +36,12 @@ const std::vector<Library> kLibraries{
     {"xxhash", {"src/cache/"}},
     {"flann/", {"src/bake/"}},
     {"hwy/", {"src/"}},
-    {"Imf", {"src/render/"}},
+    {"Imf", {"src/render/", "src/scene/bitmap_exr.cpp"}},
     {"Iex", {"src/render/"}},
     {"IlmThread", {"src/render/"}},
     {"OpenEXR/", {"src/render/"}},
     {"openexr", {"src/render/"}},
-    {"stb", {"src/render/"}},
+    {"stb", {"src/render/", "src/scene/bitmap.cpp"}},
     {"CLI/", {"tools/"}},
 };
 const std::vector<std::string> kSystemHeaders{"sys/", "fcntl.h", "unistd.h", "signal.h", "dirent.h"};

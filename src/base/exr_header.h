@@ -7,7 +7,9 @@
 
 namespace nacre {
 
-/// Longest header that load_exr reads, in bytes.
+/// Most pixels of an image that is written or read.
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
+/// Longest header that is read, in bytes.
 inline constexpr std::size_t kMaxExrHeader = std::size_t{4} << 20;
 
 /// OpenEXR allocates what a header asks for before it looks whether the file holds as much; this holds the

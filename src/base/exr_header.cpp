@@ -1,12 +1,12 @@
 // Walks the attributes of an OpenEXR header and checks sizes that decide what will be allocated.
-#include "render/exr_header.h"
+#include "base/exr_header.h"
 
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <optional>
 
-#include "render/image_check.h"
+#include "nacre/base/error.h"
 
 namespace nacre {
 namespace {
