@@ -46,8 +46,8 @@ const std::vector<TagRule>& tag_rules() {
     };
     for (const char* tag : {"integer", "float", "boolean", "string"})
       list.push_back({tag, {"name", "value"}, {}, true});
-    for (const char* tag :
-         {"integrator", "sensor", "film", "sampler", "rfilter", "emitter", "shape", "bsdf", "subsurface"})
+    for (const char* tag : {"integrator", "sensor", "film", "sampler", "rfilter", "emitter", "shape", "bsdf",
+                            "subsurface", "texture"})
       list.push_back({tag, {"type"}, {"id", "name"}, false});
     return list;
   }();
