@@ -6,6 +6,8 @@
 namespace nacre {
 namespace {
 
+constexpr float kLeastContrast = 1e-3f;
+
 Roughness clean(const Roughness& roughness) {
   if (std::max(roughness.u, roughness.v) < kLeastRoughness) return {};
   return {std::max(roughness.u, kLeastRoughness), std::max(roughness.v, kLeastRoughness)};
@@ -119,6 +121,9 @@ Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
     bsdf.two_sided = true;
     bsdf.eta = medium->eta();
   }
+  // Light passes facets between like indices straight on, whatever their normals, which then cannot be told
+  // from the directions.
+  if (bsdf.transmits && std::abs(bsdf.eta - 1) < kLeastContrast) bsdf.roughness = {};
   return bsdf;
 }
 
