@@ -25,13 +25,14 @@ std::string digest(const HashState& state) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
-std::string hash_geometry(const Mesh& mesh, bool with_normals) {
+std::string hash_geometry(const Mesh& mesh, bool with_normals, bool with_uvs) {
   const HashState state = make_hash();
   const std::uint64_t counts[2] = {mesh.positions.size(), mesh.triangles.size()};
   XXH3_128bits_update(state.get(), counts, sizeof counts);
   XXH3_128bits_update(state.get(), mesh.positions.data(), mesh.positions.size() * sizeof(Vec3));
   XXH3_128bits_update(state.get(), mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle));
   if (with_normals) XXH3_128bits_update(state.get(), mesh.normals.data(), mesh.normals.size() * sizeof(Vec3));
+  if (with_uvs) XXH3_128bits_update(state.get(), mesh.uvs.data(), mesh.uvs.size() * sizeof(Vec2));
   return digest(state);
 }
 
@@ -45,6 +46,44 @@ std::string hash_picture(const Bitmap& picture) {
 
 std::string text(const Vec3& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); }
 
+std::string text(const Rgb& color, const Roughness& roughness) {
+  return fmt::format("{} {} {}", text(color), roughness.u, roughness.v);
+}
+
+std::string text(const CheckerboardTexture& texture) {
+  return fmt::format("checkerboard {} {}", text(texture.color0), text(texture.color1));
+}
+std::string text(const BitmapTexture& texture) {
+  const HashState state = make_hash();
+  const std::vector<Rgb>& texels = texture.bitmap.texels;
+  XXH3_128bits_update(state.get(), texels.data(), texels.size() * sizeof(Rgb));
+  return fmt::format("bitmap {} {} {} {} {} {}", texture.bitmap.width, texture.bitmap.height, digest(state),
+                     static_cast<int>(texture.wrap_u), static_cast<int>(texture.wrap_v), texture.nearest);
+}
+std::string text(const Texture& texture) {
+  return fmt::format("{} {} {} {} {}",
+                     std::visit([](const auto& model) { return text(model); }, texture.model),
+                     texture.scale.x, texture.scale.y, texture.offset.x, texture.offset.y);
+}
+
+// A surface of the kinds and the plainness that the first caches knew keeps their words.
+std::string text(const DiffuseSurface& surface) { return "diffuse " + text(surface.reflectance); }
+std::string text(const DielectricSurface& surface) {
+  if (surface.roughness.u == 0 && surface.roughness.v == 0) return "dielectric";
+  return fmt::format("roughdielectric {} {} {} {}", text(surface.specular_reflectance, surface.roughness),
+                     text(surface.specular_transmittance), surface.int_ior, surface.ext_ior);
+}
+std::string text(const PlasticSurface& surface) {
+  const std::string plastic = fmt::format("plastic {} {} {} {}", text(surface.diffuse_reflectance),
+                                          surface.int_ior, surface.ext_ior, surface.nonlinear);
+  if (surface.roughness.u == 0 && surface.roughness.v == 0) return plastic;
+  return "rough" + plastic + " " + text(surface.specular_reflectance, surface.roughness);
+}
+std::string text(const ConductorSurface& surface) {
+  return fmt::format("conductor {} {} {}", text(surface.eta), text(surface.k),
+                     text(surface.specular_reflectance, surface.roughness));
+}
+
 class Fingerprinter {
  public:
   Fingerprinter(const Scene& scene, std::span<const int> bounces, bool shadows)
@@ -56,13 +95,14 @@ class Fingerprinter {
       const std::string name = "medium " + medium_name(scene_, m);
       add(name + "/eta", fmt::format("{}", scene_.media[m].eta()));
       add(name + "/bounces", fmt::format("{}", bounces_[m]));
+      add_entry_albedo(name, m);
     }
     for (const Shape& shape : scene_.shapes) {
       if (casts_no_light(shape)) continue;
       const std::string name = "shape " + shape.id;
       // Samples lie on the faces and have their normals; light bounces off the smooth normals.
       const bool reflects = bounce_matters() && shape.medium == kNone;
-      add(name + "/geometry", hash_geometry(shape.mesh, reflects));
+      add(name + "/geometry", hash_geometry(shape.mesh, reflects, has_texture(shape, reflects)));
       add(name + "/medium",
           shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
       if (reflects) add_surface(name, shape);
@@ -93,14 +133,33 @@ class Fingerprinter {
   }
   void add_surface(const std::string& name, const Shape& shape) {
     if (shape.surface == kNone) return add(name + "/surface", "default");
-    const auto& model = scene_.surfaces[static_cast<std::size_t>(shape.surface)].model;
-    if (const auto* diffuse = std::get_if<DiffuseSurface>(&model))
-      add(name + "/surface", "diffuse " + text(diffuse->reflectance));
-    else if (const auto* plastic = std::get_if<PlasticSurface>(&model))
-      add(name + "/surface", fmt::format("plastic {} {} {} {}", text(plastic->diffuse_reflectance),
-                                         plastic->int_ior, plastic->ext_ior, plastic->nonlinear));
-    else
-      add(name + "/surface", "dielectric");
+    const Surface& surface = scene_.surfaces[static_cast<std::size_t>(shape.surface)];
+    const std::string model = std::visit([](const auto& m) { return text(m); }, surface.model);
+    add(name + "/surface", model + (surface.two_sided ? " twosided" : ""));
+    const SurfaceTextures& t = surface.textures;
+    add_texture(name + "/diffuse_texture", t.diffuse);
+    add_texture(name + "/specular_reflectance_texture", t.specular_reflectance);
+    add_texture(name + "/specular_transmittance_texture", t.specular_transmittance);
+  }
+  void add_texture(const std::string& key, int texture) {
+    if (texture != kNone) add(key, text(scene_.textures[static_cast<std::size_t>(texture)]));
+  }
+  // What colours light on its way in; white surfaces have no entry.
+  void add_entry_albedo(const std::string& name, std::size_t medium) {
+    if (medium >= scene_.subsurface.size()) return;
+    const SubsurfaceSettings& s = scene_.subsurface[medium];
+    if (s.albedo_texture == kNone && s.surface_albedo == Rgb(1, 1, 1)) return;
+    add(name + "/surface_albedo", fmt::format("{} {}", text(s.surface_albedo), s.albedo_at_entry));
+    add_texture(name + "/albedo_texture", s.albedo_texture);
+  }
+  bool has_texture(const Shape& shape, bool reflects) const {
+    const auto at = [](int index) { return static_cast<std::size_t>(index); };
+    if (shape.medium != kNone)
+      return at(shape.medium) < scene_.subsurface.size() &&
+             scene_.subsurface[at(shape.medium)].albedo_texture != kNone;
+    if (!reflects || shape.surface == kNone) return false;
+    const SurfaceTextures& t = scene_.surfaces[at(shape.surface)].textures;
+    return std::max({t.diffuse, t.specular_reflectance, t.specular_transmittance}) != kNone;
   }
   void add_light(const PointLight& light) {
     add(name_ + "/position", text(light.position));

@@ -136,6 +136,22 @@ Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept {
   return length > 0 ? n / length : face_normal(mesh, hit.triangle);
 }
 
+Vec2 texture_coordinates(const Mesh& mesh, const Hit& hit) noexcept {
+  if (mesh.uvs.empty()) return {hit.u, hit.v};
+  const Triangle& t = mesh.triangles[hit.triangle];
+  return mesh.uvs[t[0]] * (1 - hit.u - hit.v) + mesh.uvs[t[1]] * hit.u + mesh.uvs[t[2]] * hit.v;
+}
+
+Vec3 u_tangent(const Mesh& mesh, std::uint32_t triangle) noexcept {
+  if (mesh.uvs.empty()) return {0, 0, 0};
+  const Triangle& t = mesh.triangles[triangle];
+  const Vec2 d1 = mesh.uvs[t[1]] - mesh.uvs[t[0]], d2 = mesh.uvs[t[2]] - mesh.uvs[t[0]];
+  const Vec3 e1 = mesh.positions[t[1]] - mesh.positions[t[0]];
+  const Vec3 e2 = mesh.positions[t[2]] - mesh.positions[t[0]];
+  const Vec3 tangent = e1 * d2.y - e2 * d1.y;
+  return d1.cross(d2) < 0 ? -tangent : tangent;
+}
+
 float triangle_extent(const Mesh& mesh, std::uint32_t triangle) noexcept {
   const Triangle& t = mesh.triangles[triangle];
   const Vec3d a(mesh.positions[t[0]]), b(mesh.positions[t[1]]), c(mesh.positions[t[2]]);

@@ -26,6 +26,19 @@ double integrate_from_root(double a, double b, const F& f) {
 
 }  // namespace
 
+float fresnel_conductor(float cos_i, float eta, float k) noexcept {
+  const float cos2 = cos_i * cos_i, sin2 = 1 - cos2;
+  const float real = eta * eta - k * k - sin2;
+  const float a2_b2 = std::sqrt(real * real + square(2 * eta * k));
+  const float a = std::sqrt(std::max(0.0f, (a2_b2 + real) / 2));
+  const float r_s_sum = a2_b2 + cos2, r_s_mixed = 2 * cos_i * a;
+  const float r_p_sum = cos2 * a2_b2 + sin2 * sin2, r_p_mixed = r_s_mixed * sin2;
+  if (!(r_s_sum + r_s_mixed > 0) || !(r_p_sum + r_p_mixed > 0)) return 1;
+  const float r_s = (r_s_sum - r_s_mixed) / (r_s_sum + r_s_mixed);
+  const float r_p = r_s * (r_p_sum - r_p_mixed) / (r_p_sum + r_p_mixed);
+  return std::clamp((r_s + r_p) / 2, 0.0f, 1.0f);
+}
+
 double fresnel_diffuse_reflectance(double eta) noexcept {
   const double inverse = 1 / eta;
   if (eta >= 1) return (-1.440 * inverse + 0.710) * inverse + 0.668 + 0.0636 * eta;

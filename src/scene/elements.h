@@ -4,6 +4,7 @@
 #include <string>
 
 #include "nacre/scene/scene.h"
+#include "scene/parameters.h"
 #include "scene/scene_xml.h"
 
 namespace nacre {
@@ -22,10 +23,16 @@ struct SensorElement {
   int samples_per_pixel = 0;  // 0: the sensor does not say
 };
 
+/// Finds the element that a <ref> names.
+using Resolve = std::function<const XmlElement&(const XmlElement& ref)>;
+
 /// <bsdf>
-Surface read_surface(const XmlElement& element, Warnings& warnings);
+Surface read_surface(const XmlElement& element, const Resolve& resolve, const TextureIndex& textures,
+                     Warnings& warnings);
+/// <texture>, and the picture it shows
+Texture read_texture(const XmlElement& element, Warnings& warnings);
 /// <subsurface>
-MediumElement read_medium(const XmlElement& element, Warnings& warnings);
+MediumElement read_medium(const XmlElement& element, const TextureIndex& textures, Warnings& warnings);
 /// <emitter> directly inside <scene>: every type but area.
 Light read_light(const XmlElement& element, Warnings& warnings);
 /// <emitter> inside shape `shape`, of type area.

@@ -55,7 +55,7 @@ Medium read_coefficients(Parameters& parameters) {
 
 }  // namespace
 
-MediumElement read_medium(const XmlElement& element, Warnings& warnings) {
+MediumElement read_medium(const XmlElement& element, const TextureIndex& textures, Warnings& warnings) {
   if (plugin_type(element) != "dipole") fail_unknown_type(element, "dipole");
   Parameters parameters(element, warnings);
   MediumElement result;
@@ -83,6 +83,10 @@ MediumElement read_medium(const XmlElement& element, Warnings& warnings) {
   settings.irradiance_samples = parameters.integer("irrSamples", 0, 0, 1'000'000);
   settings.indirect = parameters.boolean("irrIndirect", true);
   settings.sample_multiplier = parameters.number("sampleMultiplier", 1, {0, 1e6, true});
+  const auto [albedo, texture] = parameters.color_or_texture("surfaceAlbedo", {1, 1, 1}, kFraction, textures);
+  settings.surface_albedo = albedo;
+  settings.albedo_texture = texture;
+  settings.albedo_at_entry = parameters.number("albedoAtEntry", 0.5f, kFraction);
   if (parameters.has("quality")) {
     parameters.number("quality", 0, kPositive);
     warnings.push_back(

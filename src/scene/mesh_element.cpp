@@ -81,7 +81,11 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
   if (face_normals && has_angle)
     fail(ErrorCode::kValue, parameters.place("maxSmoothAngle"),
          "give either faceNormals or maxSmoothAngle, not both");
-  parameters.finish({"bsdf", "subsurface", "emitter", "ref"}, {"flipTexCoords", "srgb", "collapse"});
+  // Here v = 0 is the bottom of a picture, which is what Mitsuba's default, true, makes of files.
+  const bool upright = parameters.boolean("flipTexCoords", true);
+  parameters.finish({"bsdf", "subsurface", "emitter", "ref"}, {"srgb", "collapse"});
+  if (!upright)
+    for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
 
   if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
   transform_mesh(mesh, to_world, parameters.place("toWorld"));

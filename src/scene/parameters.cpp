@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "nacre/scene/scene.h"
 #include "scene/values.h"
 
 namespace nacre {
@@ -14,6 +15,12 @@ constexpr std::string_view kValueTags[] = {"integer", "float", "boolean", "strin
 
 bool is_value(const XmlElement& element) {
   return std::ranges::find(kValueTags, element.tag) != std::end(kValueTags);
+}
+
+// <texture name="reflectance">, or a <ref> to one in its place: parameters of surfaces and media.
+bool is_texture(const XmlElement& element, const XmlElement& plugin) {
+  if (plugin.tag != "bsdf" && plugin.tag != "subsurface") return false;
+  return element.tag == "texture" || (element.tag == "ref" && element.has("name"));
 }
 
 // Equal for toWorld and to_world.
@@ -44,7 +51,10 @@ void check_range(double number, const Range& range, std::string_view name, const
 Parameters::Parameters(const XmlElement& plugin, Warnings& warnings) : plugin_(plugin), warnings_(warnings) {
   std::map<std::string, std::size_t> lines;
   for (const XmlElement& child : plugin.children) {
-    if (!is_value(child)) continue;
+    if (!is_value(child) && !is_texture(child, plugin)) continue;
+    if (!child.has("name"))
+      fail(ErrorCode::kSyntax, child.place(),
+           "<{}> lacks the attribute 'name': the parameter of {} it is for", child.tag, name());
     std::string key = canonical(child.get("name"));
     if (const auto [first, is_new] = lines.emplace(key, child.line); !is_new)
       fail(ErrorCode::kSyntax, child.place(), "{} is given twice, first in line {}", child.get("name"),
@@ -120,6 +130,13 @@ Rgb Parameters::color(std::string_view name, const Rgb& fallback, const Range& r
   return *color;
 }
 
+ColorOrTexture Parameters::color_or_texture(std::string_view name, const Rgb& fallback, const Range& range,
+                                            const TextureIndex& textures) {
+  const XmlElement* element = find(name);
+  if (element && is_texture(*element, plugin_)) return {Rgb(1, 1, 1), textures(*element)};
+  return {color(name, fallback, range), kNone};
+}
+
 Matrix4 Parameters::transform(std::string_view name) {
   const XmlElement* element = find(name);
   if (!element) return {};
@@ -170,12 +187,17 @@ std::string Parameters::name() const {
 void Parameters::finish(std::initializer_list<std::string_view> children,
                         std::initializer_list<std::string_view> accepted) {
   for (const XmlElement& child : plugin_.children)
-    if (!is_value(child) && std::ranges::find(children, child.tag) == children.end())
+    if (!is_value(child) && !is_texture(child, plugin_) &&
+        std::ranges::find(children, child.tag) == children.end())
       fail(ErrorCode::kSyntax, child.place(), "<{}> cannot stand inside {}", child.tag, name());
   for (const Entry& entry : entries_) {
     const bool quiet = std::ranges::any_of(accepted, [&](auto a) { return canonical(a) == entry.key; });
     if (entry.known || quiet) continue;
     const std::string known = known_.empty() ? "none" : fmt::format("{}", fmt::join(known_, ", "));
+    if (is_texture(*entry.element, plugin_))
+      fail(ErrorCode::kUnsupported, entry.element->place(),
+           "{} has no parameter '{}' for a texture (there are: {})", name(), entry.element->get("name"),
+           known);
     warnings_.push_back(fmt::format("{}: {} has no parameter '{}', ignored (there are: {})",
                                     entry.element->place(), name(), entry.element->get("name"), known));
   }

@@ -1,6 +1,7 @@
 // The parameters of one plugin element, typed and checked.
 #pragma once
 
+#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <string>
@@ -20,6 +21,15 @@ struct Range {
 inline constexpr double kUnbounded = std::numeric_limits<double>::max();
 inline constexpr Range kPositive{0, kUnbounded, true}, kNotNegative{0, kUnbounded}, kFraction{0, 1};
 
+/// Index into Scene::textures of a <texture>, or of the one that a <ref> names.
+using TextureIndex = std::function<int(const XmlElement&)>;
+
+/// A colour, or a texture in its place.
+struct ColorOrTexture {
+  Rgb color;    // white if there is a texture
+  int texture;  // kNone if there is not
+};
+
 /// Reads the parameters of a plugin (<shape>, <bsdf>, ...) by name; case and underscores do not count, so
 /// that to_world is toWorld. Every getter returns `fallback` if the parameter is absent, and throws Error
 /// with the line of the parameter if it is of another type, is not a finite number or is outside its range.
@@ -34,6 +44,8 @@ class Parameters {
   std::string string(std::string_view name, const std::string& fallback);
   Vec3d triple(std::string_view name, const Vec3d& fallback);  // <point> or <vector>
   Rgb color(std::string_view name, const Rgb& fallback, const Range& range);
+  ColorOrTexture color_or_texture(std::string_view name, const Rgb& fallback, const Range& range,
+                                  const TextureIndex& textures);
   Matrix4 transform(std::string_view name);                     // identity if absent
   float ior(std::string_view name, std::string_view fallback);  // a number, or a name like "bk7"
   float length_mm(std::string_view name, float fallback);       // "50mm", "50" or a number
@@ -43,8 +55,9 @@ class Parameters {
   bool has(std::string_view name) { return find(name) != nullptr; }
   /// Line of the parameter, or of the plugin if it is absent.
   std::string place(std::string_view name);
-  /// Throws Error(kSyntax) if a nested plugin is not of `children`; warns of parameters that no getter has
-  /// asked for and that are not among those `accepted` without effect.
+  /// Throws Error(kSyntax) if a nested plugin is not of `children`, kUnsupported if a parameter that no
+  /// getter has asked for is a texture; warns of parameters that no getter has asked for and that are not
+  /// among those `accepted` without effect.
   void finish(std::initializer_list<std::string_view> children = {},
               std::initializer_list<std::string_view> accepted = {});
 

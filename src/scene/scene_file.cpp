@@ -29,9 +29,13 @@ class Builder {
   void add_default_camera();
   int surface_index(const XmlElement& element);
   int medium_index(const XmlElement& element);
+  int texture_index(const XmlElement& element);
+  Surface read_surface_of(const XmlElement& element);
+  MediumElement read_medium_of(const XmlElement& element);
   int add_default_surface(const Shape& shape);
   const XmlElement& resolve(const XmlElement& ref) const;
   void warn_about_shape(const Shape& shape);
+  void warn_about_textures(const Shape& shape);
   void warn(const std::string& place, const std::string& text) {
     scene_.warnings.push_back(place + ": " + text);
   }
@@ -39,7 +43,7 @@ class Builder {
   Scene& scene_;
   const XmlElement& root_;
   std::map<std::string, const XmlElement*> ids_;
-  std::map<const XmlElement*, int> surfaces_, media_;  // those that are in the scene already
+  std::map<const XmlElement*, int> surfaces_, media_, textures_;  // those that are in the scene already
   std::size_t triangles_ = 0;
   bool has_integrator_ = false, has_sample_count_ = false;
 };
@@ -63,14 +67,15 @@ const XmlElement& Builder::resolve(const XmlElement& ref) const {
 void Builder::build() {
   for (const XmlElement& element : root_.children) add_element(element);
   Parameters(root_, scene_.warnings)
-      .finish({"integrator", "sensor", "emitter", "shape", "bsdf", "subsurface"});
+      .finish({"integrator", "sensor", "emitter", "shape", "bsdf", "subsurface", "texture"});
 
   if (scene_.shapes.empty()) fail(ErrorCode::kValue, scene_.path, "the scene has no <shape>");
   // Surfaces and media enter the scene with the first shape that uses them; the others are only checked.
   for (const XmlElement& element : root_.children) {
-    if (element.tag == "bsdf" && !surfaces_.contains(&element)) read_surface(element, scene_.warnings);
+    if (element.tag == "texture") texture_index(element);
+    if (element.tag == "bsdf" && !surfaces_.contains(&element)) read_surface_of(element);
     if (element.tag == "subsurface" && !media_.contains(&element)) {
-      read_medium(element, scene_.warnings);
+      read_medium_of(element);
       warn(element.place(), fmt::format("no shape uses the subsurface '{}'", element.get("id")));
     }
   }
@@ -118,14 +123,35 @@ void Builder::add_sensor(const XmlElement& element) {
 
 int Builder::surface_index(const XmlElement& element) {
   const auto [found, is_new] = surfaces_.emplace(&element, static_cast<int>(scene_.surfaces.size()));
-  if (is_new) scene_.surfaces.push_back(read_surface(element, scene_.warnings));
+  if (is_new) scene_.surfaces.push_back(read_surface_of(element));
+  return found->second;
+}
+
+Surface Builder::read_surface_of(const XmlElement& element) {
+  return read_surface(
+      element, [this](const XmlElement& ref) -> const XmlElement& { return resolve(ref); },
+      [this](const XmlElement& texture) { return texture_index(texture); }, scene_.warnings);
+}
+
+MediumElement Builder::read_medium_of(const XmlElement& element) {
+  return read_medium(
+      element, [this](const XmlElement& texture) { return texture_index(texture); }, scene_.warnings);
+}
+
+int Builder::texture_index(const XmlElement& element) {
+  const XmlElement& texture = element.tag == "ref" ? resolve(element) : element;
+  if (texture.tag != "texture")
+    fail(ErrorCode::kUnsupported, element.place(), "'{}' is a <{}>; {} has to be a colour or a <texture>",
+         element.get("id"), texture.tag, element.get("name"));
+  const auto [found, is_new] = textures_.emplace(&texture, static_cast<int>(scene_.textures.size()));
+  if (is_new) scene_.textures.push_back(read_texture(texture, scene_.warnings));
   return found->second;
 }
 
 int Builder::medium_index(const XmlElement& element) {
   const auto [found, is_new] = media_.emplace(&element, static_cast<int>(scene_.media.size()));
   if (is_new) {
-    MediumElement read = read_medium(element, scene_.warnings);
+    MediumElement read = read_medium_of(element);
     scene_.media.push_back(std::move(read.medium));
     scene_.subsurface.push_back(read.settings);
   }
@@ -179,6 +205,7 @@ void Builder::add_shape(const XmlElement& element) {
     scene_.lights.push_back(std::move(*light));
   }
   if (shape.surface == kNone && shape.medium == kNone) shape.surface = add_default_surface(shape);
+  warn_about_textures(shape);
   if (shape.medium != kNone) warn_about_shape(shape);
   scene_.shapes.push_back(std::move(shape));
 }
@@ -194,6 +221,20 @@ void Builder::warn_about_shape(const Shape& shape) {
     warn(shape.place, fmt::format("{}: the boundary has the relative index {:.4g} of the subsurface, the "
                                   "{:.4g} of the dielectric is ignored",
                                   shape.id, eta, boundary->int_ior / boundary->ext_ior));
+}
+
+void Builder::warn_about_textures(const Shape& shape) {
+  SurfaceTextures used;
+  if (shape.surface != kNone) used = scene_.surfaces[static_cast<std::size_t>(shape.surface)].textures;
+  const int albedo = shape.medium == kNone
+                         ? kNone
+                         : scene_.subsurface[static_cast<std::size_t>(shape.medium)].albedo_texture;
+  const int any = std::max({used.diffuse, used.specular_reflectance, used.specular_transmittance, albedo});
+  if (any != kNone && shape.mesh.uvs.empty())
+    warn(shape.place,
+         fmt::format("{} has a texture and no texture coordinates: every triangle shows the corner "
+                     "of it below the diagonal",
+                     shape.id));
 }
 
 // In front of the translucent shapes, else of those that do not emit.

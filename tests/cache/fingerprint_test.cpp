@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "nacre/geometry/mesh.h"
 
 namespace nacre {
@@ -194,6 +196,71 @@ TEST(Fingerprint, ReflectancesCountOnlyWhereLightBounces) {
   EXPECT_EQ(mismatch(varnish, 0), "");
   const std::string text = mismatch(varnish, 1);
   EXPECT_TRUE(contains(text, "is plastic 0.5 0.5 0.5 1.49 1.000277 false")) << text;
+}
+
+TEST(Fingerprint, EveryNumberOfASurfaceCounts) {
+  using Change = std::function<void(Surface&)>;
+  const auto differs = [](const auto& model, const Change& change) {
+    Scene scene = make_scene();
+    scene.surfaces[0].model = model;
+    const KeyValues before = fingerprint(scene, 1);
+    EXPECT_EQ(describe_mismatch(before, fingerprint(scene, 1)), "");
+    change(scene.surfaces[0]);
+    return contains(describe_mismatch(before, fingerprint(scene, 1)), "shape table/surface was");
+  };
+  const ConductorSurface metal{{1, 2, 3}, {4, 5, 6}, {1, 1, 1}, {0.1f, 0.2f}};
+  const auto of_metal = [](Surface& s) -> ConductorSurface& { return std::get<ConductorSurface>(s.model); };
+  EXPECT_TRUE(differs(metal, [&](Surface& s) { of_metal(s).eta.y = 9; }));
+  EXPECT_TRUE(differs(metal, [&](Surface& s) { of_metal(s).k.z = 9; }));
+  EXPECT_TRUE(differs(metal, [&](Surface& s) { of_metal(s).specular_reflectance.x = 0; }));
+  EXPECT_TRUE(differs(metal, [&](Surface& s) { of_metal(s).roughness.v = 0.3f; }));
+  EXPECT_TRUE(differs(metal, [](Surface& s) { s.two_sided = true; }));
+  EXPECT_TRUE(differs(PlasticSurface{}, [](Surface& s) {
+    std::get<PlasticSurface>(s.model).roughness = {0.1f, 0.1f};
+  }));
+  EXPECT_TRUE(differs(DielectricSurface{}, [](Surface& s) {
+    std::get<DielectricSurface>(s.model).roughness = {0.1f, 0.1f};
+  }));
+}
+
+Scene make_textured_scene() {
+  Scene scene = make_scene();
+  BitmapTexture picture;
+  picture.bitmap = {1, 2, {{0, 0, 0}, {1, 1, 1}}};
+  scene.textures = {{"", "", picture}, {"", "", CheckerboardTexture{}}};
+  scene.surfaces[0].textures.diffuse = 0;
+  scene.subsurface[0].albedo_texture = 1;
+  for (Shape& shape : scene.shapes) shape.mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  return scene;
+}
+template <class Change>
+std::string textured_mismatch(const Change& change, int bounces) {
+  Scene scene = make_textured_scene();
+  const KeyValues before = fingerprint(scene, bounces);
+  change(scene);
+  return describe_mismatch(before, fingerprint(scene, bounces));
+}
+
+TEST(Fingerprint, TexturesCountWhereLightMeetsThem) {
+  const auto repaint = [](Scene& s) {
+    std::get<BitmapTexture>(s.textures[0].model).bitmap.texels[1].y = 0.5f;
+  };
+  EXPECT_EQ(textured_mismatch(repaint, 0), "");
+  EXPECT_TRUE(contains(textured_mismatch(repaint, 1), "shape table/diffuse_texture was bitmap 1 2 "));
+  const auto move = [](Scene& s) { s.shapes[1].mesh.uvs[0] = {0.5f, 0.5f}; };
+  EXPECT_EQ(textured_mismatch(move, 0), "");
+  EXPECT_EQ(textured_mismatch(move, 1), "shape table/geometry has changed");
+  // Light enters through the albedo of a translucent object always.
+  EXPECT_TRUE(contains(textured_mismatch([](Scene& s) { s.textures[1].scale.x = 3; }, 0),
+                       "medium wax/albedo_texture was checkerboard"));
+  EXPECT_TRUE(contains(textured_mismatch([](Scene& s) { s.subsurface[0].albedo_at_entry = 1; }, 0),
+                       "medium wax/surface_albedo was 1 1 1 0.5"));
+  EXPECT_EQ(textured_mismatch(
+                [](Scene& s) {
+                  s.shapes[0].mesh.uvs[0] = {0.5f, 0.5f};
+                },
+                0),
+            "shape candle/geometry has changed");
 }
 
 // Opaque shapes reflect about their smooth normals; samples have those of the faces.

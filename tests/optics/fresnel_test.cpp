@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <complex>
+
 namespace nacre {
 namespace {
 
@@ -86,6 +88,35 @@ TEST(Reflect, Mirrors) {
   const Vec3 r = reflect(Vec3(0.6f, 0, 0.8f), Vec3(0, 0, 1));
   EXPECT_NEAR(r.x, -0.6f, 1e-6);
   EXPECT_NEAR(r.z, 0.8f, 1e-6);
+}
+
+// At normal incidence ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2); without k a dielectric; all of it at grazing
+// incidence and of a perfect mirror.
+TEST(Fresnel, ConductorHasItsLimits) {
+  EXPECT_NEAR(fresnel_conductor(1, 0.2f, 3.9f), (0.64 + 15.21) / (1.44 + 15.21), 1e-6);
+  for (const float cosine : {0.0f, 1e-3f, 0.1f, 0.5f, 0.9f, 1.0f}) {
+    EXPECT_NEAR(fresnel_conductor(cosine, 1.5f, 0), fresnel_reflectance(cosine, 1.5f), 2e-6);
+    EXPECT_EQ(fresnel_conductor(cosine, 0, 1), 1);
+    for (const float eta : {0.0f, 0.1f, 1.0f, 3.0f, 1000.0f})
+      for (const float k : {0.0f, 0.1f, 5.0f, 1000.0f}) {
+        EXPECT_GE(fresnel_conductor(cosine, eta, k), 0);
+        EXPECT_LE(fresnel_conductor(cosine, eta, k), 1);
+      }
+  }
+  EXPECT_EQ(fresnel_conductor(0, 1.4f, 7.6f), 1);
+}
+
+// Against the amplitudes in complex arithmetic.
+TEST(Fresnel, ConductorMatchesComplexAmplitudes) {
+  for (const std::complex<double> n : {std::complex<double>(0.2, 3.9), {1.4, 7.6}, {3.6, 4.3}})
+    for (const double cosine : {0.05, 0.3, 0.7, 0.95}) {
+      const std::complex<double> cos_t = std::sqrt(1.0 - (1 - cosine * cosine) / (n * n));
+      const auto r_s = (cosine - n * cos_t) / (cosine + n * cos_t);
+      const auto r_p = (n * cosine - cos_t) / (n * cosine + cos_t);
+      EXPECT_NEAR(fresnel_conductor(static_cast<float>(cosine), static_cast<float>(n.real()),
+                                    static_cast<float>(n.imag())),
+                  (std::norm(r_s) + std::norm(r_p)) / 2, 1e-5);
+    }
 }
 
 }  // namespace

@@ -114,7 +114,8 @@ TEST(SceneFile, ReferencesShareAndOrderDoesNotMatter) {
 }
 
 TEST(SceneFile, WhatIsNotUsedIsCheckedAllTheSame) {
-  EXPECT_THROW(scene_of(std::string(kShape) + R"(<bsdf type="roughplastic" id="a"/>)"), Error);
+  EXPECT_THROW(scene_of(std::string(kShape) + R"(<bsdf type="ward" id="a"/>)"), Error);
+  EXPECT_THROW(scene_of(std::string(kShape) + R"(<texture type="curvature" id="a"/>)"), Error);
   EXPECT_THROW(scene_of(std::string(kShape) + R"(<subsurface type="other" id="a"/>)"), Error);
 }
 
@@ -218,7 +219,8 @@ TEST(SceneFile, UnknownParametersAreWarnedOfWithTheKnownOnes) {
 <float name="radiuss" value="2"/></shape>)");
   EXPECT_EQ(count_warnings(scene,
                            "scene.xml:3: shape 'disk' has no parameter 'radiuss', ignored (there are: "
-                           "toWorld, flipNormals, faceNormals, maxSmoothAngle, subdivisions)"),
+                           "toWorld, flipNormals, faceNormals, maxSmoothAngle, subdivisions, "
+                           "flipTexCoords)"),
             1);
 }
 

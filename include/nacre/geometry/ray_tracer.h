@@ -56,6 +56,12 @@ Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 
+/// Interpolated texture coordinates of a hit; without any, its barycentric (u, v), as in Mitsuba.
+Vec2 texture_coordinates(const Mesh& mesh, const Hit& hit) noexcept;
+/// Direction in which the first texture coordinate of a triangle grows along it, of any length; zero where
+/// there are none or they are degenerate.
+Vec3 u_tangent(const Mesh& mesh, std::uint32_t triangle) noexcept;
+
 /// How far off a triangle's plane rays are tested, over Embree's precision: the diameter of the triangle's
 /// circumscribed circle. About its longest edge, but more for a flat obtuse one, whose plane is ill defined;
 /// at most 1024 edges.

@@ -19,6 +19,10 @@ Real fresnel_reflectance(Real cos_i, Real eta) noexcept {
   return (r_s * r_s + r_p * r_p) / 2;
 }
 
+/// Unpolarized reflectance of a smooth conductor of complex index eta + i k, both relative to the medium
+/// outside, for cos_i in [0, 1]. 1 for eta = 0, the perfect mirror. Source: Born & Wolf 1999, section 14.2.
+float fresnel_conductor(float cos_i, float eta, float k) noexcept;
+
 /// Diffuse reflectance F_dr by the polynomial fit of Egan and Hilgeman 1973; eta = n_inside / n_outside.
 double fresnel_diffuse_reflectance(double eta) noexcept;
 

@@ -13,27 +13,50 @@
 #include "nacre/geometry/mesh.h"
 #include "nacre/optics/medium.h"
 #include "nacre/scene/bitmap.h"
+#include "nacre/scene/texture.h"
 
 namespace nacre {
+
+inline constexpr int kNone = -1;
+
+/// GGX roughness along the tangent (the direction in which u grows) and across it; 0: smooth.
+struct Roughness {
+  float u = 0, v = 0;
+};
 
 /// Lambertian: albedo / pi. One-sided as in Mitsuba: black from behind.
 struct DiffuseSurface {
   Rgb reflectance{0.5f, 0.5f, 0.5f};
 };
-/// Smooth dielectric boundary: on a translucent shape the boundary of the medium, else clear glass.
+/// Dielectric boundary: on a translucent shape the boundary of the medium, else clear glass.
 struct DielectricSurface {
   float int_ior = 1.5046f, ext_ior = 1.000277f;
   Rgb specular_reflectance{1, 1, 1}, specular_transmittance{1, 1, 1};
+  Roughness roughness{};
 };
-/// Smooth dielectric coat over a diffuse base.
+/// Dielectric coat over a diffuse base.
 struct PlasticSurface {
   float int_ior = 1.49f, ext_ior = 1.000277f;
   Rgb diffuse_reflectance{0.5f, 0.5f, 0.5f}, specular_reflectance{1, 1, 1};
   bool nonlinear = false;
+  Roughness roughness{};
+};
+/// Metal. Its complex index is eta + i k, relative to what is outside.
+struct ConductorSurface {
+  Rgb eta{0, 0, 0}, k{1, 1, 1};
+  Rgb specular_reflectance{1, 1, 1};
+  Roughness roughness{};
+};
+/// Indices into Scene::textures. Where there is one, it multiplies the colour of that name in the model.
+struct SurfaceTextures {
+  int diffuse = kNone;  // of DiffuseSurface::reflectance, too
+  int specular_reflectance = kNone, specular_transmittance = kNone;
 };
 struct Surface {
   std::string id, place;
-  std::variant<DiffuseSurface, DielectricSurface, PlasticSurface> model;
+  std::variant<DiffuseSurface, DielectricSurface, PlasticSurface, ConductorSurface> model;
+  SurfaceTextures textures{};
+  bool two_sided = false;  // the back looks like the front
 };
 
 /// How the samples of one subsurface element are to be made, next to its Medium.
@@ -41,6 +64,11 @@ struct SubsurfaceSettings {
   int irradiance_samples = 0;   // per light; 0: nacre's default
   bool indirect = true;         // irrIndirect
   float sample_multiplier = 1;  // times the default number of samples
+  /// Reflectance of the surface itself, which colours light on its way in, by albedo^albedo_at_entry, and on
+  /// its way out, by albedo^(1 - albedo_at_entry).
+  Rgb surface_albedo{1, 1, 1};
+  int albedo_texture = kNone;  // index into Scene::textures; multiplies surface_albedo
+  float albedo_at_entry = 0.5f;
 };
 
 /// Emission of light. Positions and directions in world space; spectra are scene-linear rgb.
@@ -85,8 +113,6 @@ struct Light {
 bool is_delta(const Light& light);
 /// Whether it is a constant light or an environment map, of which a scene has at most one.
 bool is_environment(const Light& light);
-
-inline constexpr int kNone = -1;
 
 struct Shape {
   std::string id;     // from the file, else "shape 1", "shape 2", ... in order of appearance
@@ -138,6 +164,7 @@ struct Scene {
   std::vector<Medium> media;
   std::vector<SubsurfaceSettings> subsurface;  // parallel to media
   std::vector<Surface> surfaces;
+  std::vector<Texture> textures;
   std::vector<Light> lights;
   std::vector<Camera> cameras;  // at least one; the first is the default. Film belongs to all of them
   std::vector<Film> films;      // parallel to cameras
