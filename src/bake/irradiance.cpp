@@ -14,8 +14,9 @@ std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& po
   parallel_for(points.positions.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Vec3& normal = points.normals[i];
-      const Receiver at{points.positions[i], normal,
-                        offset_from_surface(points.positions[i], normal, points.extents[i]), eta};
+      Receiver at{points.positions[i], normal,
+                  offset_from_surface(points.positions[i], normal, points.extents[i]), eta};
+      if (!points.albedos.empty()) at.albedo = points.albedos[i];
       irradiance[i] = estimate_irradiance(world, at, samples, bounces, hash_words(seed, i));
     }
     progress.advance(end - begin);

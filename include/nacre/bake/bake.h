@@ -55,6 +55,7 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
 struct ReceiverPoints {
   std::span<const Vec3> positions, normals;
   std::span<const float> extents;
+  std::span<const Rgb> albedos;  // of the surface on the way in (surface_albedo); empty: 1
 };
 
 /// Irradiance E_t transmitted at points into a medium of relative index eta, from every light with `samples`
