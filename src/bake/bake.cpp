@@ -6,6 +6,7 @@
 #include "bake/area_shares.h"
 #include "bake/group_surface.h"
 #include "bake/placement.h"
+#include "bake/translucent_radiance.h"
 #include "nacre/base/random.h"
 #include "nacre/base/version.h"
 #include "nacre/cache/fingerprint.h"
@@ -15,6 +16,8 @@
 namespace nacre {
 namespace {
 
+// Rounds of light between translucent objects.
+constexpr int kInterreflections = 2;
 // Per sample in the file: ten planes and its part of the nodes, about one to five samples.
 constexpr double kBytesPerSample = 4.0 * static_cast<double>(kPlaneCount) + 64.0 / 3;
 
@@ -51,6 +54,7 @@ struct PlacedSamples {
   SurfaceSamples samples;
   std::vector<float> extents;
   std::vector<Rgb> albedos;  // on the way in; empty where the surface is white
+  double surface_area = 0;
 };
 
 // Weights of a triangle's second and third vertex at a point of it.
@@ -94,6 +98,7 @@ PlacedSamples place_samples(const World& world, std::size_t medium, const GroupS
   const std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
   PlacedSamples result;
   result.samples.areas = compute_area_shares(surface, placed, progress);
+  result.surface_area = surface.areas.total();
   result.albedos = entry_albedos(world, medium, placed);
   for (auto* vectors : {&result.samples.positions, &result.samples.normals}) vectors->reserve(placed.size());
   result.extents.reserve(placed.size());
@@ -152,37 +157,61 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
   return plan;
 }
 
+namespace {
+
+// Octrees over all groups; `storage` owns them.
+std::vector<CacheGroup> build_groups(const BakePlan& plan, std::span<const PlacedSamples> placed,
+                                     std::vector<std::shared_ptr<const void>>& storage, Report& report) {
+  const StageTimer timer(report, "build_octree");
+  storage.clear();
+  std::vector<CacheGroup> groups;
+  for (std::size_t m = 0; m < placed.size(); ++m)
+    groups.push_back(build_group(plan.groups[m].name, placed[m].surface_area, placed[m].samples, storage));
+  return groups;
+}
+
+}  // namespace
+
 Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
            Report& report) {
   const Scene& scene = *world.scene;
-  Cache cache;
-  std::vector<std::shared_ptr<const void>> storage;
+  std::vector<PlacedSamples> placed;
   std::vector<int> bounces;
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
-    const GroupPlan& group = plan.groups[m];
-    PlacedSamples placed;
-    double area = 0;
-    {
-      const StageTimer timer(report, "place_samples");
-      const GroupSurface surface = make_group_surface(group_meshes(scene, m));
-      area = surface.areas.total();
-      placed = place_samples(world, m, surface, group.points, hash_words(params.seed, m, 0), progress);
-    }
-    {
-      const StageTimer timer(report, "irradiance");
-      placed.samples.irradiance = compute_irradiance(
-          world, {placed.samples.positions, placed.samples.normals, placed.extents, placed.albedos},
-          scene.media[m].eta(), group.irradiance_samples, group.bounces, hash_words(params.seed, m, 1),
-          progress);
-    }
-    const StageTimer timer(report, "build_octree");
-    cache.groups.push_back(build_group(group.name, area, placed.samples, storage));
-    bounces.push_back(group.bounces);
-    report.counts["points"] += cache.groups.back().size();
-    report.counts["octree_nodes"] += cache.groups.back().nodes.size();
+    const StageTimer timer(report, "place_samples");
+    const GroupSurface surface = make_group_surface(group_meshes(scene, m));
+    placed.push_back(
+        place_samples(world, m, surface, plan.groups[m].points, hash_words(params.seed, m, 0), progress));
+    bounces.push_back(plan.groups[m].bounces);
+  }
+  const auto light_samples = [&](const TranslucentAnswer& answer) {
+    const StageTimer timer(report, "irradiance");
+    for (std::size_t m = 0; m < placed.size(); ++m)
+      placed[m].samples.irradiance = compute_irradiance(
+          world,
+          {placed[m].samples.positions, placed[m].samples.normals, placed[m].extents, placed[m].albedos},
+          scene.media[m].eta(), plan.groups[m].irradiance_samples, plan.groups[m].bounces,
+          hash_words(params.seed, m, 1), progress, answer);
+  };
+
+  Cache cache;
+  std::vector<std::shared_ptr<const void>> storage;
+  light_samples({});
+  cache.groups = build_groups(plan, placed, storage, report);
+  for (int round = 0; params.interreflect && round < kInterreflections; ++round) {
+    const TranslucentRadiance radiance = [&] {
+      const StageTimer timer(report, "diffusion");
+      return TranslucentRadiance(world, cache.groups, progress);
+    }();
+    light_samples(std::cref(radiance));
+    cache.groups = build_groups(plan, placed, storage, report);
+  }
+  for (const CacheGroup& group : cache.groups) {
+    report.counts["points"] += group.size();
+    report.counts["octree_nodes"] += group.nodes.size();
   }
   const StageTimer timer(report, "fingerprint");
-  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows);
+  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows, params.interreflect);
   cache.info = make_info(scene, plan, params, cache.groups);
   cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
   return cache;

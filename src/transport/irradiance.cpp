@@ -13,7 +13,7 @@ float transmittance(const Receiver& at, float cosine) {
   return 1 - fresnel_reflectance(std::min(cosine, 1.0f), at.eta);
 }
 
-// By connections; where rays look for lights as well, weighted against `rays` of them by the balance
+// By connections; where rays look for lights as well, weighted against `rays` of them by the power
 // heuristic.
 Rgb connected_irradiance(const World& world, const Receiver& at, int samples, int rays, std::uint64_t key,
                          std::uint32_t first_sample) {
@@ -26,8 +26,8 @@ Rgb connected_irradiance(const World& world, const Receiver& at, int samples, in
         const Visibility visibility = see_light(world, at.origin, light);
         float weight = 1;
         if (connection.density > 0 && !visibility.through_glass)
-          weight = connection.density /
-                   (connection.density + static_cast<float>(rays) * pdf_cosine_hemisphere(cosine));
+          weight =
+              power_heuristic(connection.density, static_cast<float>(rays) * pdf_cosine_hemisphere(cosine));
         sum += light.irradiance * visibility.transmittance * (weight * cosine * transmittance(at, cosine));
       });
   return sum;

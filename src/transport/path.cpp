@@ -19,8 +19,6 @@ Vec3 connecting_normal(const ScatterPoint& at) {
              : at.surface.frame.n * (dot(at.surface.frame.n, at.out) < 0 ? -1.0f : 1.0f);
 }
 
-float balance(float chosen, float other) { return chosen / (chosen + other); }
-
 PathRay ray_from(const ScatterPoint& at, const Vec3& direction) {
   PathRay next;
   next.ray = {at.point.origin(at.point.side(direction)), direction};
@@ -45,7 +43,7 @@ Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noe
     const float connections =
         expected_connections(world, light, ray.position, ray.normal, ray.light_samples) *
         pdf_light(world, light, ray.position, ray.ray.direction, ray.normal);
-    return radiance * balance(ray.density, connections);
+    return radiance * power_heuristic(ray.density, connections);
   }
   const int light = world.shape(hit).light;
   if (light == kNone) return {0, 0, 0};
@@ -55,7 +53,7 @@ Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noe
   if (ray.density == 0) return radiance;
   const float connections = expected_connections(world, index, ray.position, ray.normal, ray.light_samples) *
                             pdf_light(world, index, ray.position, hit);
-  return radiance * balance(ray.density, connections);
+  return radiance * power_heuristic(ray.density, connections);
 }
 
 ScatterPoint scatter_point(const World& world, const Hit& hit, const Vec3& out) noexcept {
@@ -82,7 +80,7 @@ Rgb reflect_direct_light(const World& world, const ScatterPoint& at, int samples
                                                ? pdf_bsdf(at.surface, light.direction, at.out)
                                                : 0.0f;
                         sum += value * light.irradiance * visibility.transmittance *
-                               (rays > 0 ? balance(connection.density, rays) : 1.0f);
+                               (rays > 0 ? power_heuristic(connection.density, rays) : 1.0f);
                       });
   return sum;
 }

@@ -24,7 +24,7 @@ struct PathRay {
 };
 
 /// Radiance of lights that the ray meets at `hit`, or where nothing is hit of light all around; times the
-/// weight by the balance heuristic against connections. Source: Veach & Guibas 1995.
+/// power heuristic's weight against connections.
 Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noexcept;
 
 /// A place where light scatters: the surface as it is seen from `out`.
