@@ -13,8 +13,7 @@ float transmittance(const Receiver& at, float cosine) {
   return 1 - fresnel_reflectance(std::min(cosine, 1.0f), at.eta);
 }
 
-// By connections; where rays look for lights as well, weighted against `rays` of them by the power
-// heuristic.
+// By connections; where rays look for lights as well, weighted against `rays` of them.
 Rgb connected_irradiance(const World& world, const Receiver& at, int samples, int rays, std::uint64_t key,
                          std::uint32_t first_sample) {
   Rgb sum(0, 0, 0);
@@ -23,12 +22,14 @@ Rgb connected_irradiance(const World& world, const Receiver& at, int samples, in
         const LightSample& light = connection.sample;
         const float cosine = dot(light.direction, at.normal);
         if (cosine <= 0) return;
-        const Visibility visibility = see_light(world, at.origin, light);
         float weight = 1;
-        if (connection.density > 0 && !visibility.through_glass)
-          weight =
-              power_heuristic(connection.density, static_cast<float>(rays) * pdf_cosine_hemisphere(cosine));
-        sum += light.irradiance * visibility.transmittance * (weight * cosine * transmittance(at, cosine));
+        if (connection.density > 0)
+          weight = connection_weight(light.pdf, connection.density,
+                                     static_cast<float>(rays) * pdf_cosine_hemisphere(cosine), {});
+        if (weight == 0 && !world.has_glass) return;
+        const Visibility visibility = see_light(world, at.origin, light);
+        sum += light.irradiance * visibility.transmittance *
+               ((visibility.through_glass ? 1.0f : weight) * cosine * transmittance(at, cosine));
       });
   return sum;
 }

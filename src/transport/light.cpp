@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "nacre/optics/fresnel.h"
+#include "nacre/transport/area_light.h"
 #include "nacre/transport/surface.h"
 
 namespace nacre {
@@ -74,31 +75,14 @@ LightSample sample_model(const Query& query, const EnvironmentMap&) {
   return {direction, kInfinity, {}, map.radiance(direction) / pdf, pdf};
 }
 
-// Per steradian at x for points uniform by area; 0 from behind. Distances reach where their cubes overflow
-// single precision.
-float pdf_of_area(const Vec3& x, const Vec3& p, const Vec3& normal, double area) {
-  const Vec3d to_light = Vec3d(p) - Vec3d(x);
-  const double facing = -to_light.dot(Vec3d(normal)),
-               distance2 = to_light.length2();  // facing: times the distance
-  if (!(facing > 0)) return 0;
-  const double pdf = distance2 * std::sqrt(distance2) / (facing * area);
-  return pdf < std::numeric_limits<float>::max() ? static_cast<float>(pdf) : 0;
-}
-
 LightSample sample_model(const Query& query, const AreaLight& light) {
   const Mesh& mesh = query.world.scene->shapes[light.shape].mesh;
-  const Distribution& triangles = query.world.lights.triangles[query.light];
-  double choice = static_cast<double>(query.u.x);
-  const std::size_t triangle = triangles.sample(choice);
-  const Vec2 b = sample_uniform_triangle({static_cast<float>(choice), query.u.y});
-  const Triangle& t = mesh.triangles[triangle];
-  const Vec3& p0 = mesh.positions[t[0]];
-  const Vec3 p = p0 + (mesh.positions[t[1]] - p0) * b.x + (mesh.positions[t[2]] - p0) * b.y;
-  const float pdf = pdf_of_area(query.x, p, face_normal(mesh, triangle), triangles.total());
-  if (!(pdf > 0)) return {};
-  const Vec3 to_light = p - query.x;
+  const AreaSample sample =
+      sample_area_light(mesh, query.world.lights.triangles[query.light], query.x, query.u);
+  const Vec3 to_light = sample.point - query.x;
   const float distance = to_light.length();
-  return {to_light / distance, distance, p, light.radiance / pdf, pdf};
+  if (!(sample.pdf > 0) || !(distance > 0)) return {};
+  return {to_light / distance, distance, sample.point, light.radiance / sample.pdf, sample.pdf};
 }
 
 }  // namespace
@@ -113,9 +97,7 @@ LightSample sample_light(const World& world, std::size_t light, const Vec3& x, c
 float pdf_light(const World& world, std::size_t light, const Vec3& x, const Hit& hit) noexcept {
   const auto* area = std::get_if<AreaLight>(&world.scene->lights[light].model);
   if (!area || !hit || hit.mesh != area->shape) return 0;
-  const Mesh& mesh = world.shape(hit).mesh;
-  return pdf_of_area(x, hit_position(mesh, hit), face_normal(mesh, hit.triangle),
-                     world.lights.triangles[light].total());
+  return pdf_area_light(world.shape(hit).mesh, world.lights.triangles[light], x, hit);
 }
 
 float pdf_light(const World& world, std::size_t light, const Vec3&, const Vec3& direction,

@@ -32,7 +32,30 @@ NextRay smooth_ray(const ScatterPoint& at, const PathRay& before, const BsdfSamp
   return next;
 }
 
+// What connections leave of a light to a ray.
+float ray_share(const World& world, const PathRay& ray, std::size_t light, float light_pdf) {
+  const float count = expected_connections(world, light, ray.position, ray.normal, ray.light_samples);
+  return 1 - connection_weight(light_pdf, count * light_pdf, ray.density, ray.span);
+}
+
 }  // namespace
+
+LobeSpan lobe_span(const Bsdf& bsdf) noexcept {
+  constexpr float kDiffuse = kPi;
+  if (!bsdf.specular || !bsdf.rough()) return {};
+  // Mirrored directions turn by twice as much as facets do.
+  const float rough = std::min(4 * kPi * bsdf.roughness.u * bsdf.roughness.v, kDiffuse);
+  return {rough, is_black(bsdf.diffuse) ? rough : kDiffuse};
+}
+
+float connection_weight(float light_pdf, float connections, float rays, const LobeSpan& span) noexcept {
+  constexpr float kFar = 4;
+  if (!(connections > 0)) return 0;
+  if (!(rays > 0) || span.narrow * light_pdf > kFar) return 1;
+  if (span.wide * light_pdf * kFar < 1) return 0;
+  const float ratio = rays / connections;  // squares of densities may overflow
+  return 1 / (1 + ratio * ratio);
+}
 
 Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noexcept {
   if (!ray.emission) return {0, 0, 0};
@@ -40,20 +63,16 @@ Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noe
     const Rgb radiance = environment_radiance(world, ray.ray.direction);
     if (ray.density == 0 || is_black(radiance)) return radiance;
     const std::size_t light = world.lights.environment;
-    const float connections =
-        expected_connections(world, light, ray.position, ray.normal, ray.light_samples) *
-        pdf_light(world, light, ray.position, ray.ray.direction, ray.normal);
-    return radiance * power_heuristic(ray.density, connections);
+    return radiance *
+           ray_share(world, ray, light, pdf_light(world, light, ray.position, ray.ray.direction, ray.normal));
   }
-  const int light = world.shape(hit).light;
-  if (light == kNone) return {0, 0, 0};
-  const auto index = static_cast<std::size_t>(light);
-  if (dot(face_normal(world.shape(hit).mesh, hit.triangle), ray.ray.direction) >= 0) return {0, 0, 0};
-  const Rgb radiance = std::get<AreaLight>(world.scene->lights[index].model).radiance;
+  const Shape& shape = world.shape(hit);
+  if (shape.light == kNone || dot(face_normal(shape.mesh, hit.triangle), ray.ray.direction) >= 0)
+    return {0, 0, 0};
+  const auto light = static_cast<std::size_t>(shape.light);
+  const Rgb radiance = std::get<AreaLight>(world.scene->lights[light].model).radiance;
   if (ray.density == 0) return radiance;
-  const float connections = expected_connections(world, index, ray.position, ray.normal, ray.light_samples) *
-                            pdf_light(world, index, ray.position, hit);
-  return radiance * power_heuristic(ray.density, connections);
+  return radiance * ray_share(world, ray, light, pdf_light(world, light, ray.position, hit));
 }
 
 ScatterPoint scatter_point(const World& world, const Hit& hit, const Vec3& out) noexcept {
@@ -67,20 +86,24 @@ Rgb reflect_direct_light(const World& world, const ScatterPoint& at, int samples
   const Bsdf& bsdf = at.surface.bsdf;
   if (is_black(bsdf.diffuse) && !(bsdf.specular && bsdf.rough())) return sum;
   // Rays do not see what they would if nothing blocked light.
+  const LobeSpan span = lobe_span(bsdf);
   const bool shared = continuation == Continuation::kGoesOn && world.shadows;
   for_each_connection(world, at.point.position, connecting_normal(at), samples, hash_words(key, kConnection),
                       first_sample, [&](const Connection& connection) {
                         const LightSample& light = connection.sample;
                         const Rgb value = eval_bsdf(at.surface, light.direction, at.out);
                         if (is_black(value)) return;
+                        const bool found_by_rays = shared && connection.density > 0;
+                        const float weight =
+                            found_by_rays
+                                ? connection_weight(light.pdf, connection.density,
+                                                    pdf_bsdf(at.surface, light.direction, at.out), span)
+                                : 1.0f;
+                        if (weight == 0 && !world.has_glass) return;
                         const Visibility visibility =
                             see_light(world, at.point.origin(at.point.side(light.direction)), light);
-                        if (is_black(visibility.transmittance)) return;
-                        const float rays = shared && connection.density > 0 && !visibility.through_glass
-                                               ? pdf_bsdf(at.surface, light.direction, at.out)
-                                               : 0.0f;
                         sum += value * light.irradiance * visibility.transmittance *
-                               (rays > 0 ? power_heuristic(connection.density, rays) : 1.0f);
+                               (visibility.through_glass ? 1.0f : weight);
                       });
   return sum;
 }
@@ -98,6 +121,7 @@ NextRay next_ray(const World& world, const ScatterPoint& at, const PathRay& befo
   next.ray.position = at.point.position;
   next.ray.normal = connecting_normal(at);
   next.ray.light_samples = light_samples;
+  next.ray.span = lobe_span(at.surface.bsdf);
   return next;
 }
 
@@ -121,8 +145,8 @@ Rgb trace_light(const World& world, PathRay ray, int bounces, std::uint64_t key,
     if (bounce == bounces) break;
     const ScatterPoint at = scatter_point(world, hit, out);
     const std::uint64_t vertex = hash_words(key, static_cast<std::uint64_t>(bounce));
-    // At the last vertex connections alone will do for a diffuse surface.
-    const bool ends = bounce + 1 == bounces && !at.surface.bsdf.specular;
+    // At the last vertex connections alone will do for a diffuse surface, if no other answer is wanted.
+    const bool ends = bounce + 1 == bounces && !at.surface.bsdf.specular && !answer;
     sum += throughput *
            reflect_direct_light(world, at, 1, vertex, 0, ends ? Continuation::kEnds : Continuation::kGoesOn);
     if (ends) break;

@@ -79,7 +79,7 @@ TEST(Plane, MeanIsTheTotalOfTheProfile) {
       Medium medium = make_test_medium();
       medium.sigma_a = {1.0f, 2.0f, 0.5f};
       medium.profile = profile;
-      add_shape(scene, placed(make_rectangle(), 12, {3, 1, 0}), kNone, add_medium(scene, medium));
+      add_shape(scene, placed(make_rectangle(), 6, {3, 1, 0}), kNone, add_medium(scene, medium));
       add_directional_light(scene, {0, 0, -1}, {1, 2, 3});
       const World world = make_world(scene, true);
       const MonteCarloDiffusion diffusion(world, 0, sampling, 0);
@@ -99,7 +99,8 @@ TEST(Plane, MeanIsTheTotalOfTheProfile) {
         const double expected = profiles[static_cast<std::size_t>(k)].total * transmitted * (k + 1);
         const double mean = sum[k] / kGroups;
         const double error = std::sqrt((squares[k] / kGroups - square(mean)) / (kGroups - 1));
-        EXPECT_LT(error, 0.005 * expected) << static_cast<int>(profile) << " " << static_cast<int>(sampling);
+        EXPECT_LT(error, (sampling == MonteCarloSampling::kUniform ? 0.015 : 0.005) * expected)
+            << static_cast<int>(profile) << " " << static_cast<int>(sampling);
         EXPECT_NEAR(mean / expected, 1, 0.001 + 3.5 * error / expected)
             << static_cast<int>(profile) << " " << static_cast<int>(sampling) << " " << k;
       }
@@ -182,7 +183,8 @@ TEST(Blocks, AgreeWithTheHierarchicalSumWithinTheirNoise) {
       EXPECT_GE(blocks, 120) << subject.name;
       EXPECT_LE(outside, std::max(2, blocks / 100)) << subject.name;
       EXPECT_LT(worst, 4.5) << subject.name;
-      EXPECT_LT(squares / blocks, 1.3) << subject.name;
+      // The three channels of a block share their samples: a third of the deviations are independent.
+      EXPECT_LT(squares / blocks, 1.03 + 4 * std::sqrt(2.0 / (blocks / 3))) << subject.name;
     }
   }
 }

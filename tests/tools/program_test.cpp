@@ -70,12 +70,68 @@ TEST_F(Program, BeautyIsTheSumOfItsLayers) {
   for (const std::string k : {"R", "G", "B"}) {
     const auto& beauty = find_channel(a, k)->values;
     for (std::size_t i = 0; i < beauty.size(); ++i) {
-      const float sum = find_channel(a, "diffusion." + k)->values[i] +
-                        find_channel(a, "specular." + k)->values[i] +
-                        find_channel(a, "surface." + k)->values[i];
+      const float sum =
+          find_channel(a, "diffusion." + k)->values[i] + find_channel(a, "single." + k)->values[i] +
+          find_channel(a, "specular." + k)->values[i] + find_channel(a, "surface." + k)->values[i];
       ASSERT_EQ(beauty[i], sum) << k << i;
     }
   }
+}
+
+TEST_F(Program, SingleScatteringAndMethodsHaveTheirOptions) {
+  run("bake s.xml -o s.cache");
+  run("render s.xml --cache s.cache --single-samples 0 -o none.exr");
+  run("render s.xml --cache s.cache --single-samples 1 -o one.exr");
+  run("render s.xml --cache s.cache --single-samples 64 -o many.exr");
+  const auto sum = [&](const std::string& file, const std::string& layer) {
+    const Image a = image(file);
+    double total = 0;
+    for (const char* k : {"R", "G", "B"})
+      for (const float v : find_channel(a, layer + k)->values) total += static_cast<double>(v);
+    return total;
+  };
+  EXPECT_EQ(sum("none.exr", "single."), 0);
+  EXPECT_GT(sum("many.exr", "single."), 0);
+  EXPECT_NEAR(sum("one.exr", "single.") / sum("many.exr", "single."), 1, 0.05);
+  EXPECT_EQ(sum("none.exr", "diffusion."), sum("many.exr", "diffusion."));
+
+  run("render s.xml --method montecarlo --mc-samples 64 -o mc.exr");
+  run("render s.xml --method montecarlo --mc-samples 64 --mc-sampling uniform -o area.exr");
+  run("render s.xml --method lambert -o lambert.exr");
+  EXPECT_NEAR(sum("mc.exr", "diffusion.") / sum("none.exr", "diffusion."), 1, 0.03);
+  EXPECT_NEAR(sum("area.exr", "diffusion.") / sum("none.exr", "diffusion."), 1, 0.05);
+  EXPECT_EQ(sum("lambert.exr", "single."), 0);
+  EXPECT_GT(sum("lambert.exr", "diffusion."), 0);
+}
+
+TEST_F(Program, OptionsWithNothingToActOnAreRefused) {
+  run("bake s.xml -o s.cache");
+  for (const char* options :
+       {"--method montecarlo --cache s.cache", "--method lambert --spacing 1", "--mc-samples 4",
+        "--mc-sampling uniform", "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
+    EXPECT_EQ(run_nacre(folder_, std::string("render s.xml -o x.exr ") + options).exit_code, 2) << options;
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("x.exr")));
+}
+
+// Without shadows the cache and the picture have to agree about that.
+TEST_F(Program, ShadowsAreOneChoiceForBakeAndRender) {
+  run("bake s.xml --no-shadows -o s.cache");
+  const auto refused = run_nacre(folder_, "render s.xml --cache s.cache -o x.exr");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.output.find("shadows"), std::string::npos) << refused.output;
+  run("render s.xml --cache s.cache --no-shadows -o x.exr");
+}
+
+// The coefficients count in a cache that holds light between translucent objects, and in no other.
+TEST_F(Program, InterreflectionBindsTheCacheToItsMaterials) {
+  run("bake s.xml -o free.cache");
+  run("bake s.xml --interreflect -o bound.cache");
+  run("render s.xml --cache free.cache -D sigma_a=0.2 -o a.exr");
+  run("render s.xml --cache bound.cache -o b.exr");
+  const auto refused =
+      run_nacre(folder_, "render s.xml --cache bound.cache -D sigma_a=0.2 -o x.exr");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.output.find("coefficients"), std::string::npos) << refused.output;
 }
 
 TEST_F(Program, BakedInMemoryOrBeforeIsTheSame) {

@@ -20,7 +20,7 @@ struct LightSample {
   float pdf = 0;            // that density, per steradian at x; 0 for lights that is_delta()
 };
 
-/// Samples light `light` as seen from x. `u` chooses a point of an area light, uniform by area, or a
+/// Samples light `light` as seen from x. `u` chooses a point of an area light (sample_area_light) or a
 /// direction of light from all around: a map's by its radiance, a constant light's by cosine about `normal`
 /// (unit length) or uniform without one.
 LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u,

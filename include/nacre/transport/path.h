@@ -10,6 +10,20 @@
 
 namespace nacre {
 
+/// Solid angles, about, over which the narrowest and the widest part of what scatters light spread their
+/// rays, steradians.
+struct LobeSpan {
+  float narrow = kPi, wide = kPi;  // a cosine
+};
+LobeSpan lobe_span(const Bsdf& bsdf) noexcept;
+
+/// Weight of connections to a light where rays look for it as well; that of rays is what is missing to 1.
+/// `light_pdf` is the density of one connection per steradian, `connections` and `rays` are the densities
+/// of all of them. A light far wider than every lobe is left to rays, one far narrower than every lobe to
+/// connections, so that the way which hardly has noise gets none from the other; in between the power
+/// heuristic divides (Veach 1997, section 9.2).
+float connection_weight(float light_pdf, float connections, float rays, const LobeSpan& span) noexcept;
+
 /// A ray that looks for light, and how it was chosen.
 struct PathRay {
   Ray ray;
@@ -21,10 +35,11 @@ struct PathRay {
   float density = 0;
   Vec3 position{0, 0, 0}, normal{0, 0, 0};
   int light_samples = 1;
+  LobeSpan span;
 };
 
 /// Radiance of lights that the ray meets at `hit`, or where nothing is hit of light all around; times the
-/// power heuristic's weight against connections.
+/// ray's share beside connections (connection_weight).
 Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noexcept;
 
 /// A place where light scatters: the surface as it is seen from `out`.
