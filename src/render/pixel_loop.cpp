@@ -14,6 +14,9 @@ constexpr int kMaxWaves = 12;
 constexpr int kSplitWaves = 4;
 constexpr float kLeastThroughput = 1e-4f;
 
+// Filters have negative weights, too.
+float magnitude(const Rgb& throughput) { return std::max(max_channel(throughput), max_channel(-throughput)); }
+
 // Adds the time of its life to a sum over threads.
 class StageClock {
  public:
@@ -76,12 +79,13 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size
   std::vector<Path> paths;
   paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
   for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
-    const std::uint64_t key = pixel_key(pixel, 0);
+    const std::uint64_t key = pixel_key(pixel, 0), lens_key = hash_words(key, 1);
     const auto [x, y] = place(pixel);
     const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
     for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
-      const Vec2 at = centre + filter_.sample(sobol_2d(sample, key));
-      paths.push_back({camera_.at(at), {1, 1, 1}, pixel, sample, Layer::kSurface, {}});
+      const FilterSample offset = filter_.sample(sobol_2d(sample, key));
+      const Ray ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
+      paths.push_back({ray, Rgb(offset.weight), pixel, sample, Layer::kSurface, {}});
     }
   }
   return paths;
@@ -91,7 +95,7 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels)
   for (Path& path : paths) {
     if (!path.hit) continue;
     const std::size_t index = path.pixel;
-    pixels.coverage[index] += 1;
+    pixels.coverage[index] += path.throughput.x;  // the weight of the filter
     if (path.sample != 0) continue;
     const SurfacePoint point = surface_point(world_, path.hit);
     pixels.position[index] = point.position;
@@ -207,12 +211,12 @@ void PixelLoop::continue_specular(const Path& path, const Bsdf& bsdf, const Surf
     through.branch = 2 * path.branch + 1;
     through.throughput *= bsdf.specular_transmittance * refracted;
     through.ray = {point.origin(-side), transmitted.normalized()};
-    if (max_channel(through.throughput) > kLeastThroughput) next.push_back(through);
+    if (magnitude(through.throughput) > kLeastThroughput) next.push_back(through);
   }
   child.branch = 2 * path.branch;
   child.throughput *= bsdf.specular_reflectance * reflected;
   child.ray = {point.origin(side), reflect(out, normal).normalized()};
-  if (max_channel(child.throughput) > kLeastThroughput) next.push_back(child);
+  if (magnitude(child.throughput) > kLeastThroughput) next.push_back(child);
 }
 
 }  // namespace nacre
