@@ -78,7 +78,11 @@ ShapeMesh make_mesh(Parameters& parameters, const std::string& type, Warnings& w
 
 constexpr double kMinArea = 1e-30;  // below it single precision has no face normals
 
-void check_extent(const Mesh& mesh, const std::string& place) {
+}  // namespace
+
+void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transform_place,
+                const std::string& place) {
+  transform_mesh(mesh, to_world, transform_place);
   for (const Vec3& p : mesh.positions)
     for (int k = 0; k < 3; ++k)
       if (!(std::abs(p[k]) < kMaxCoordinate))
@@ -87,15 +91,14 @@ void check_extent(const Mesh& mesh, const std::string& place) {
     fail(ErrorCode::kValue, place, "the shape has no area in world space");
 }
 
-}  // namespace
-
 Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
   Parameters parameters(element, warnings);
   auto [mesh, flat] = make_mesh(parameters, plugin_type(element), warnings);
   const Matrix4 to_world = parameters.transform("toWorld");
   const bool flip = parameters.boolean("flipNormals", false);
+  const bool face_normals = parameters.has("faceNormals") ? parameters.boolean("faceNormals", false)
+                                                          : flat && !parameters.has("maxSmoothAngle");
   const bool has_angle = parameters.has("maxSmoothAngle");
-  const bool face_normals = parameters.boolean("faceNormals", flat && !has_angle);
   const float angle = parameters.number("maxSmoothAngle", 180, {0, 180});
   const int levels = parameters.integer("subdivisions", 0, 0, 6);
   if (face_normals && has_angle)
@@ -108,8 +111,7 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
     for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
 
   if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
-  transform_mesh(mesh, to_world, parameters.place("toWorld"));
-  check_extent(mesh, element.place());
+  place_mesh(mesh, to_world, parameters.place("toWorld"), element.place());
   if (flip) flip_normals(mesh);
   if (face_normals) {
     mesh.normals.clear();
