@@ -126,6 +126,9 @@ void add_bake_options(CLI::App& command, BakeOptions& options) {
           "--bounces", options.bounces,
           "Bounces of light off opaque surfaces before it enters (default: as the scene's integrator)")
       ->check(CLI::Range(0, 1000));
+  command.add_flag("--interreflect", options.interreflect,
+                   "Add light that translucent objects send to themselves and each other; the cache then "
+                   "holds for these materials only");
   command.add_flag("--no-shadows", options.no_shadows, "Nothing blocks light");
 }
 
@@ -136,6 +139,7 @@ BakeParams BakeOptions::params(const CommonOptions& common) const {
   result.irradiance_samples = irradiance_samples;
   result.bounces = bounces;
   result.shadows = !no_shadows;
+  result.interreflect = interreflect;
   result.seed = common.seed;
   return result;
 }

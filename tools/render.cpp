@@ -103,8 +103,9 @@ Cache load_matching_cache(const std::string& path, const Scene& scene, bool shad
   const StageTimer timer(report, "read_cache");
   Cache cache = load_cache(path);
   const auto bounces = fingerprint_bounces(cache.fingerprint, scene.media.size());
-  const std::string mismatch =
-      describe_mismatch(cache.fingerprint, make_fingerprint(scene, bounces, shadows));
+  const std::string mismatch = describe_mismatch(
+      cache.fingerprint,
+      make_fingerprint(scene, bounces, shadows, fingerprint_interreflects(cache.fingerprint)));
   if (!mismatch.empty() || cache.groups.size() != scene.media.size())
     fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
          mismatch.empty() ? "the number of translucent groups differs" : mismatch);
@@ -144,8 +145,11 @@ std::optional<double> parse_exposure(const std::string& text) {
 void check_combination(const Options& options, bool cached) {
   if (!options.cache.empty() && options.bake.any_but_shadows())
     throw UsageError(
-        "--points, --spacing, --irradiance-samples and --bounces are for baking; --cache is baked already");
-  const bool samples_cache = options.bake.points || options.bake.spacing || options.bake.irradiance_samples;
+        "--points, --spacing, --irradiance-samples, --bounces and --interreflect are for baking; --cache is "
+        "baked "
+        "already");
+  const bool samples_cache = options.bake.points || options.bake.spacing || options.bake.irradiance_samples ||
+                             options.bake.interreflect;
   if (!cached && (!options.cache.empty() || samples_cache))
     throw UsageError(
         fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing and "

@@ -6,14 +6,18 @@
 #include "bake/area_shares.h"
 #include "bake/group_surface.h"
 #include "bake/placement.h"
+#include "bake/translucent_radiance.h"
 #include "nacre/base/random.h"
 #include "nacre/base/version.h"
 #include "nacre/cache/fingerprint.h"
 #include "nacre/cache/octree.h"
+#include "nacre/transport/surface.h"
 
 namespace nacre {
 namespace {
 
+// Rounds of light between translucent objects.
+constexpr int kInterreflections = 2;
 // Per sample in the file: ten planes and its part of the nodes, about one to five samples.
 constexpr double kBytesPerSample = 4.0 * static_cast<double>(kPlaneCount) + 64.0 / 3;
 
@@ -49,13 +53,53 @@ KeyValues make_info(const Scene& scene, const BakePlan& plan, const BakeParams& 
 struct PlacedSamples {
   SurfaceSamples samples;
   std::vector<float> extents;
+  std::vector<Rgb> albedos;  // on the way in; empty where the surface is white
+  double surface_area = 0;
 };
 
-PlacedSamples place_samples(const GroupSurface& surface, double points, std::uint64_t seed,
-                            Progress& progress) {
+// Weights of a triangle's second and third vertex at a point of it.
+Vec2 barycentric(const Mesh& mesh, const Triangle& t, const Vec3& position) {
+  const Vec3d a(mesh.positions[t[0]]), b = Vec3d(mesh.positions[t[1]]) - a,
+                                       c = Vec3d(mesh.positions[t[2]]) - a, p = Vec3d(position) - a,
+                                       n = b.cross(c);
+  const double scale = n.length2();
+  if (!(scale > 0)) return {0, 0};
+  return {static_cast<float>(std::clamp(n.dot(p.cross(c)) / scale, 0.0, 1.0)),
+          static_cast<float>(std::clamp(n.dot(b.cross(p)) / scale, 0.0, 1.0))};
+}
+
+// surface_albedo at points whose triangles are numbered over all shapes of a medium.
+std::vector<Rgb> entry_albedos(const World& world, std::size_t medium, std::span<const PlacedPoint> points) {
+  const Scene& scene = *world.scene;
+  const SubsurfaceSettings& settings = scene.subsurface[medium];
+  if (settings.albedo_texture == kNone && settings.surface_albedo == Rgb(1, 1, 1)) return {};
+  std::vector<std::uint32_t> shapes, first_triangles;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    if (scene.shapes[i].medium != static_cast<int>(medium)) continue;
+    shapes.push_back(i);
+    first_triangles.push_back(count);
+    count += static_cast<std::uint32_t>(scene.shapes[i].mesh.triangles.size());
+  }
+  std::vector<Rgb> albedos(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto at = static_cast<std::size_t>(std::ranges::upper_bound(first_triangles, points[i].triangle) -
+                                             first_triangles.begin() - 1);
+    const Mesh& mesh = scene.shapes[shapes[at]].mesh;
+    const std::uint32_t triangle = points[i].triangle - first_triangles[at];
+    const Vec2 b = barycentric(mesh, mesh.triangles[triangle], points[i].position);
+    albedos[i] = surface_albedo(world, {0, shapes[at], triangle, b.x, b.y}, true);
+  }
+  return albedos;
+}
+
+PlacedSamples place_samples(const World& world, std::size_t medium, const GroupSurface& surface,
+                            double points, std::uint64_t seed, Progress& progress) {
   const std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
   PlacedSamples result;
   result.samples.areas = compute_area_shares(surface, placed, progress);
+  result.surface_area = surface.areas.total();
+  result.albedos = entry_albedos(world, medium, placed);
   for (auto* vectors : {&result.samples.positions, &result.samples.normals}) vectors->reserve(placed.size());
   result.extents.reserve(placed.size());
   for (const PlacedPoint& point : placed) {
@@ -113,36 +157,61 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
   return plan;
 }
 
+namespace {
+
+// Octrees over all groups; `storage` owns them.
+std::vector<CacheGroup> build_groups(const BakePlan& plan, std::span<const PlacedSamples> placed,
+                                     std::vector<std::shared_ptr<const void>>& storage, Report& report) {
+  const StageTimer timer(report, "build_octree");
+  storage.clear();
+  std::vector<CacheGroup> groups;
+  for (std::size_t m = 0; m < placed.size(); ++m)
+    groups.push_back(build_group(plan.groups[m].name, placed[m].surface_area, placed[m].samples, storage));
+  return groups;
+}
+
+}  // namespace
+
 Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
            Report& report) {
   const Scene& scene = *world.scene;
-  Cache cache;
-  std::vector<std::shared_ptr<const void>> storage;
+  std::vector<PlacedSamples> placed;
   std::vector<int> bounces;
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
-    const GroupPlan& group = plan.groups[m];
-    PlacedSamples placed;
-    double area = 0;
-    {
-      const StageTimer timer(report, "place_samples");
-      const GroupSurface surface = make_group_surface(group_meshes(scene, m));
-      area = surface.areas.total();
-      placed = place_samples(surface, group.points, hash_words(params.seed, m, 0), progress);
-    }
-    {
-      const StageTimer timer(report, "irradiance");
-      placed.samples.irradiance = compute_irradiance(
-          world, {placed.samples.positions, placed.samples.normals, placed.extents}, scene.media[m].eta(),
-          group.irradiance_samples, group.bounces, hash_words(params.seed, m, 1), progress);
-    }
-    const StageTimer timer(report, "build_octree");
-    cache.groups.push_back(build_group(group.name, area, placed.samples, storage));
-    bounces.push_back(group.bounces);
-    report.counts["points"] += cache.groups.back().size();
-    report.counts["octree_nodes"] += cache.groups.back().nodes.size();
+    const StageTimer timer(report, "place_samples");
+    const GroupSurface surface = make_group_surface(group_meshes(scene, m));
+    placed.push_back(
+        place_samples(world, m, surface, plan.groups[m].points, hash_words(params.seed, m, 0), progress));
+    bounces.push_back(plan.groups[m].bounces);
+  }
+  const auto light_samples = [&](const TranslucentAnswer& answer) {
+    const StageTimer timer(report, "irradiance");
+    for (std::size_t m = 0; m < placed.size(); ++m)
+      placed[m].samples.irradiance = compute_irradiance(
+          world,
+          {placed[m].samples.positions, placed[m].samples.normals, placed[m].extents, placed[m].albedos},
+          scene.media[m].eta(), plan.groups[m].irradiance_samples, plan.groups[m].bounces,
+          hash_words(params.seed, m, 1), progress, answer);
+  };
+
+  Cache cache;
+  std::vector<std::shared_ptr<const void>> storage;
+  light_samples({});
+  cache.groups = build_groups(plan, placed, storage, report);
+  for (int round = 0; params.interreflect && round < kInterreflections; ++round) {
+    const TranslucentRadiance radiance = [&] {
+      const StageTimer timer(report, "diffusion");
+      return TranslucentRadiance(world, cache.groups, progress);
+    }();
+    light_samples(std::cref(radiance));
+    cache.groups = build_groups(plan, placed, storage, report);
+  }
+  for (const CacheGroup& group : cache.groups) {
+    report.counts["points"] += group.size();
+    report.counts["octree_nodes"] += group.nodes.size();
   }
   const StageTimer timer(report, "fingerprint");
-  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows);
+  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows, params.interreflect);
   cache.info = make_info(scene, plan, params, cache.groups);
   cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
   return cache;

@@ -11,6 +11,8 @@
 namespace nacre {
 namespace {
 
+constexpr const char* kInterreflectionKey = "interreflection";
+
 using HashState = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
 
 HashState make_hash() {
@@ -69,8 +71,7 @@ std::string text(const Texture& texture) {
 // A surface of the kinds and the plainness that the first caches knew keeps their words.
 std::string text(const DiffuseSurface& surface) { return "diffuse " + text(surface.reflectance); }
 std::string text(const DielectricSurface& surface) {
-  if (surface.roughness.u == 0 && surface.roughness.v == 0) return "dielectric";
-  return fmt::format("roughdielectric {} {} {} {}", text(surface.specular_reflectance, surface.roughness),
+  return fmt::format("dielectric {} {} {} {}", text(surface.specular_reflectance, surface.roughness),
                      text(surface.specular_transmittance), surface.int_ior, surface.ext_ior);
 }
 std::string text(const PlasticSurface& surface) {
@@ -86,16 +87,18 @@ std::string text(const ConductorSurface& surface) {
 
 class Fingerprinter {
  public:
-  Fingerprinter(const Scene& scene, std::span<const int> bounces, bool shadows)
-      : scene_(scene), bounces_(bounces), shadows_(shadows) {}
+  Fingerprinter(const Scene& scene, std::span<const int> bounces, bool shadows, bool interreflect)
+      : scene_(scene), bounces_(bounces), shadows_(shadows), interreflect_(interreflect) {}
 
   KeyValues make() {
     add("shadows", shadows_ ? "yes" : "no");
+    if (interreflect_) add(kInterreflectionKey, "yes");
     for (std::size_t m = 0; m < scene_.media.size(); ++m) {
       const std::string name = "medium " + medium_name(scene_, m);
       add(name + "/eta", fmt::format("{}", scene_.media[m].eta()));
       add(name + "/bounces", fmt::format("{}", bounces_[m]));
       add_entry_albedo(name, m);
+      if (interreflect_) add_coefficients(name, scene_.media[m]);
     }
     for (const Shape& shape : scene_.shapes) {
       if (casts_no_light(shape)) continue;
@@ -105,7 +108,7 @@ class Fingerprinter {
       add(name + "/geometry", hash_geometry(shape.mesh, reflects, has_texture(shape, reflects)));
       add(name + "/medium",
           shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
-      if (reflects) add_surface(name, shape);
+      if (reflects || (shadows_ && lets_light_through(shape))) add_surface(name, shape);
     }
     // How lights are chosen for sampling decides about noise alone.
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
@@ -130,6 +133,17 @@ class Fingerprinter {
   // Without shadows and bounces an opaque shape that does not shine leaves no trace in the cache.
   bool casts_no_light(const Shape& shape) const {
     return shape.medium == kNone && shape.light == kNone && !shadows_ && !bounce_matters();
+  }
+  // What light passes straight on its way to samples, and is attenuated by.
+  bool lets_light_through(const Shape& shape) const {
+    return shape.medium == kNone && shape.surface != kNone &&
+           std::holds_alternative<DielectricSurface>(
+               scene_.surfaces[static_cast<std::size_t>(shape.surface)].model);
+  }
+  void add_coefficients(const std::string& name, const Medium& medium) {
+    add(name + "/coefficients",
+        fmt::format("{} {} {} {} {} {}", text(medium.sigma_s), text(medium.sigma_a), text(medium.g),
+                    medium.scale, static_cast<int>(medium.profile), static_cast<int>(medium.convention)));
   }
   void add_surface(const std::string& name, const Shape& shape) {
     if (shape.surface == kNone) return add(name + "/surface", "default");
@@ -189,7 +203,7 @@ class Fingerprinter {
 
   const Scene& scene_;
   std::span<const int> bounces_;
-  bool shadows_;
+  bool shadows_, interreflect_;
   std::string name_;
   KeyValues result_;
 };
@@ -208,8 +222,13 @@ bool is_kind(const std::string& key, const std::string& kind) {
 
 }  // namespace
 
-KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows) {
-  return Fingerprinter(scene, bounces, shadows).make();
+KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows,
+                           bool interreflect) {
+  return Fingerprinter(scene, bounces, shadows, interreflect).make();
+}
+
+bool fingerprint_interreflects(const KeyValues& fingerprint) {
+  return find_value(fingerprint, kInterreflectionKey) != nullptr;
 }
 
 std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups) {

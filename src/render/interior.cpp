@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "nacre/optics/fresnel.h"
+#include "nacre/transport/surface.h"
 
 namespace nacre {
 namespace {
@@ -91,7 +92,8 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
   crossings.clear();
   const bool infinite = std::isinf(sample.distance);
   Ray ray{point.origin, sample.direction};
-  for (;;) {
+  Rgb glass(1, 1, 1);
+  for (std::size_t steps = 0;; ++steps) {
     if (!infinite) {
       ray.direction = sample.point - ray.origin;
       ray.t_max = kReach;
@@ -101,7 +103,8 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     const SurfacePoint at = surface_point(world_, hit);
     const float side = at.side(sample.direction);
     const bool foreign = world_.shape(hit).medium != medium_;
-    segment.blocked = (foreign && world_.shadows) || crossings.size() == kMostCrossings;
+    if (foreign && world_.shadows) glass *= pass_glass(world_, hit, sample.direction);
+    segment.blocked = is_black(glass) || steps == kMostCrossings;
     if (segment.blocked) return segment;
     if (!foreign)
       crossings.push_back({distance_to_plane(point.position, sample.direction, at), hit, side > 0});
@@ -110,6 +113,7 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     ray.origin = origin;
   }
 
+  segment.transmittance = glass;
   float open_since = 0;
   if (sum_spans(crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
     return segment;
@@ -121,6 +125,7 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
   LightSegment guess;
   guess.direction = sample.direction;
   guess.lost = true;
+  guess.transmittance = glass;
   if (!sum_spans(crossings, point.depth, Overlap::kIgnored, sample.direction, guess, open_since))
     end_at_box(point.position, sample.direction, open_since, guess);
   return guess;
@@ -141,7 +146,8 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
     const Vec3 normal = surface_point(world_, crossing.hit).normal_towards(direction);
     if (crossing.leaving) {
       LightSegment piece;
-      enter_through(normal, direction, crossing.t - open_since, piece);
+      enter_through(normal, surface_albedo(world_, crossing.hit, true), direction, crossing.t - open_since,
+                    piece);
       if (last_entry) {
         segment.direction = piece.direction;
         segment.cos_entry = piece.cos_entry;
@@ -151,7 +157,8 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
       segment.length += piece.length;
       segment.transmittance *= piece.transmittance;
     } else {
-      segment.transmittance *= 1 - fresnel_reflectance(std::min(dot(normal, direction), 1.0f), eta_);
+      segment.transmittance *= surface_albedo(world_, crossing.hit, false) *
+                               (1 - fresnel_reflectance(std::min(dot(normal, direction), 1.0f), eta_));
       open_since = crossing.t;
       depth = 1;
     }
@@ -160,18 +167,18 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
 }
 
 // Light from `direction` comes in at a boundary and goes on for `span`.
-void Interior::enter_through(const Vec3& normal, const Vec3& direction, float span,
+void Interior::enter_through(const Vec3& normal, const Rgb& albedo, const Vec3& direction, float span,
                              LightSegment& segment) const {
   const float cosine = std::min(dot(normal, direction), 1.0f);
   Vec3 inward;
   if (!refract(direction, normal, eta_, inward)) {
-    segment.transmittance = 0;
+    segment.transmittance = {0, 0, 0};
     return;
   }
   segment.direction = -inward.normalized();
   segment.cos_entry = cosine;
   segment.cos_refracted = dot(segment.direction, normal);
-  segment.transmittance *= 1 - fresnel_reflectance(cosine, eta_);
+  segment.transmittance *= albedo * (1 - fresnel_reflectance(cosine, eta_));
   segment.length += std::max(span, 0.0f) * segment.cos_entry / segment.cos_refracted;
 }
 
@@ -181,7 +188,7 @@ void Interior::end_at_box(const Vec3& point, const Vec3& direction, float open_s
   const float t = exit_box(box_, point, direction, normal);
   const bool first = open_since == 0;
   LightSegment piece;
-  enter_through(normal, direction, t - open_since, piece);
+  enter_through(normal, {1, 1, 1}, direction, t - open_since, piece);
   if (first) {
     segment.direction = piece.direction;
     segment.cos_entry = piece.cos_entry;

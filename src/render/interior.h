@@ -37,10 +37,10 @@ struct ViewSegment {
 /// What is left of a light's connection to a point inside.
 struct LightSegment {
   bool blocked = false;
-  bool lost = false;        // no surface ended it; the bounding box did
-  float length = 0;         // scene units, as attenuated: shortened by refraction
-  float transmittance = 1;  // of all boundaries
-  Vec3 direction;           // towards the light, refracted where the light enters for the last time
+  bool lost = false;           // no surface ended it; the bounding box did
+  float length = 0;            // scene units, as attenuated: shortened by refraction
+  Rgb transmittance{1, 1, 1};  // of all boundaries
+  Vec3 direction;              // towards the light, refracted where the light enters for the last time
   float cos_entry = 1, cos_refracted = 1;  // there, outside and inside
 };
 
@@ -62,7 +62,8 @@ class Interior {
   enum class Overlap { kCounted, kIgnored };
   bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
                  LightSegment& segment, float& open_since) const;
-  void enter_through(const Vec3& normal, const Vec3& direction, float span, LightSegment& segment) const;
+  void enter_through(const Vec3& normal, const Rgb& albedo, const Vec3& direction, float span,
+                     LightSegment& segment) const;
   void end_at_box(const Vec3& point, const Vec3& direction, float open_since, LightSegment& segment) const;
 
   const World& world_;

@@ -15,8 +15,8 @@ namespace {
 constexpr int kMostProbeHits = 1024;
 
 struct SurfaceSample {
+  Hit hit;  // of the world
   const Mesh* mesh;
-  std::uint32_t triangle;
   Vec3 position;
 };
 
@@ -56,10 +56,15 @@ std::array<Axis, 3> probe_axes(const Vec3& normal) {
   return {{{frame.n, 0.5f}, {frame.s, 0.25f}, {frame.t, 0.25f}}};
 }
 
-std::vector<const Mesh*> meshes_of(const Scene& scene, std::size_t medium) {
+std::vector<std::uint32_t> shapes_of(const Scene& scene, std::size_t medium) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i)
+    if (scene.shapes[i].medium == static_cast<int>(medium)) indices.push_back(i);
+  return indices;
+}
+std::vector<const Mesh*> meshes_of(const Scene& scene, std::span<const std::uint32_t> shapes) {
   std::vector<const Mesh*> meshes;
-  for (const Shape& shape : scene.shapes)
-    if (shape.medium == static_cast<int>(medium)) meshes.push_back(&shape.mesh);
+  for (const std::uint32_t i : shapes) meshes.push_back(&scene.shapes[i].mesh);
   return meshes;
 }
 
@@ -71,6 +76,7 @@ struct MonteCarloDiffusion::Impl {
   int bounces;
   float eta;
   std::array<Profile, 3> profiles;
+  std::vector<std::uint32_t> world_meshes;  // the medium's own, as the world numbers them
   std::vector<const Mesh*> meshes;
   RayTracer tracer;                     // of the medium's own surfaces
   Distribution shapes;                  // by area
@@ -83,7 +89,8 @@ struct MonteCarloDiffusion::Impl {
         bounces(bounce_count),
         eta(of_world.scene->media[medium].eta()),
         profiles(make_profiles(of_world.scene->media[medium])),
-        meshes(meshes_of(*of_world.scene, medium)),
+        world_meshes(shapes_of(*of_world.scene, medium)),
+        meshes(meshes_of(*of_world.scene, world_meshes)),
         tracer(meshes),
         density(of_world.scene->media[medium], std::max(double{tracer.bounds().size().length()}, 1e-30)) {
     std::vector<double> totals;
@@ -94,16 +101,22 @@ struct MonteCarloDiffusion::Impl {
     shapes = Distribution(totals);
   }
 
+  // A hit on the medium's own mesh number `mesh`.
+  SurfaceSample world_sample(std::size_t mesh, Hit hit) const {
+    hit.mesh = world_meshes[mesh];
+    return {hit, meshes[mesh], hit_position(*meshes[mesh], hit)};
+  }
+
   // What one surface point sends to x, if it was chosen with a density per area of `pdf`.
   Rgb weigh(const Vec3& x, const SurfaceSample& sample, double pdf, std::uint64_t key,
             std::uint32_t index) const {
     const double distance = (Vec3d(sample.position) - Vec3d(x)).length();
     // A point upon x itself: a density without bound, or none at all.
     if (!(pdf > 0) || !std::isfinite(pdf) || distance == 0) return {0, 0, 0};
-    const Vec3 normal = face_normal(*sample.mesh, sample.triangle);
-    const float extent = triangle_extent(*sample.mesh, sample.triangle);
+    const Vec3 normal = face_normal(*sample.mesh, sample.hit.triangle);
+    const float extent = triangle_extent(*sample.mesh, sample.hit.triangle);
     const Receiver receiver{sample.position, normal, offset_from_surface(sample.position, normal, extent),
-                            eta};
+                            eta, surface_albedo(world, sample.hit, true)};
     Rgb value = estimate_irradiance(world, receiver, 1, bounces, key, index);
     for (int k = 0; k < 3; ++k)
       value[k] *= static_cast<float>(eval_profile(profiles[static_cast<std::size_t>(k)], distance) / pdf);
@@ -115,12 +128,10 @@ struct MonteCarloDiffusion::Impl {
     double choice =
         double{sobol_1d(index, hash_words(key, 0))} + 0x1p-24 * to_unit_double(hash_words(key, 3, index));
     const std::size_t shape = shapes.sample(choice);
-    const Mesh& mesh = *meshes[shape];
     const std::size_t triangle = triangles[shape].sample(choice);
     const Vec2 b = sample_uniform_triangle(sobol_2d(index, hash_words(key, 1)));
     const Hit hit{0, 0, static_cast<std::uint32_t>(triangle), b.x, b.y};
-    return weigh(x, {&mesh, hit.triangle, hit_position(mesh, hit)}, 1 / shapes.total(), hash_words(key, 2),
-                 index);
+    return weigh(x, world_sample(shape, hit), 1 / shapes.total(), hash_words(key, 2), index);
   }
 
   Rgb sample_by_distance(const SurfacePoint& from, std::uint64_t key, std::uint32_t index) const {
@@ -150,7 +161,7 @@ struct MonteCarloDiffusion::Impl {
         pdf += static_cast<double>(axis.probability * std::abs(dot(normal, axis.direction))) *
                density.pdf((to - along * to.dot(along)).length());
       }
-      sum += weigh(from.position, {&mesh, hit.triangle, position}, pdf,
+      sum += weigh(from.position, world_sample(hit.mesh, hit), pdf,
                    hash_words(key, 2, static_cast<std::uint64_t>(n)), index);
       const float side = dot(normal, disc.n) > 0 ? 1.0f : -1.0f;
       const Vec3 origin = offset_from_surface(position, normal * side, triangle_extent(mesh, hit.triangle));

@@ -1,17 +1,18 @@
-// Primary rays, what translucent and opaque surfaces send back, mirror reflections and refractions.
+// Primary rays, what translucent and opaque surfaces send back, and rays on from there.
 #include "render/pixel_loop.h"
 
 #include "nacre/base/random.h"
 #include "nacre/optics/fresnel.h"
-#include "nacre/transport/light.h"
 
 namespace nacre {
 namespace {
 
-// Longest chain of mirror reflections and refractions.
-constexpr int kMaxWaves = 12;
-// Bounces at which both ways through glass are followed, and the share of a pixel below which a way is not.
-constexpr int kSplitWaves = 4;
+// Longest path of a direct integrator, which mirror and glass alone can make long, and of any other: by then
+// Russian roulette has ended all but one in a million.
+constexpr int kMaxDirectWaves = 12, kMaxWaves = 300;
+// Edges at which both ways at smooth boundaries are followed, and edges before Russian roulette.
+constexpr int kSplitWaves = 4, kSureDepth = 5;
+// The share of a pixel below which a way is not followed.
 constexpr float kLeastThroughput = 1e-4f;
 
 // Filters have negative weights, too.
@@ -37,9 +38,11 @@ PixelLoop::PixelLoop(const World& world, const Cache& cache, const RenderParams&
       params_(params),
       camera_(world.scene->cameras[params.camera], params.width, params.height),
       filter_(world.scene->films[params.camera]),
-      light_samples_(world.scene->integrator.emitter_samples),
-      bounces_(world.scene->integrator.kind == IntegratorKind::kPath ? world.scene->integrator.bounces()
-                                                                     : 0) {
+      light_samples_(world.scene->integrator.emitter_samples) {
+  const Integrator& integrator = world.scene->integrator;
+  counts_mirrors_ = integrator.kind == IntegratorKind::kPath;
+  depth_limit_ = !counts_mirrors_ ? 2 : integrator.max_depth < 0 ? kMaxWaves : integrator.max_depth;
+  wave_limit_ = counts_mirrors_ ? std::min(depth_limit_, kMaxWaves) : kMaxDirectWaves;
   for (std::size_t m = 0; m < world.scene->media.size(); ++m)
     media_.emplace_back(world, m, m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
 }
@@ -47,23 +50,21 @@ PixelLoop::PixelLoop(const World& world, const Cache& cache, const RenderParams&
 void PixelLoop::render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const {
   std::vector<Path> paths = start_paths(begin, end);
   std::vector<Path> next;
-  for (int wave = 0; wave < kMaxWaves && !paths.empty(); ++wave) {
+  for (int wave = 0; wave < wave_limit_ && !paths.empty(); ++wave) {
     {
       const StageClock clock(wave == 0 ? totals.primary : totals.surface);
-      for (Path& path : paths) path.hit = world_.tracer.intersect(path.ray);
+      for (Path& path : paths) path.hit = world_.tracer.intersect(path.ray.ray);
       if (wave == 0) record_first_hits(paths, pixels);
       totals.rays += paths.size();
     }
     add_translucency(paths, wave, pixels, totals);
     const StageClock clock(totals.surface);
     next.clear();
-    for (Path& path : paths)
-      if (path.hit) shade(path, wave, pixels, next);
+    for (const Path& path : paths) shade(path, wave, pixels, next);
     paths.swap(next);
   }
 }
 
-// A pixel's place in the whole picture.
 std::array<int, 2> PixelLoop::place(std::uint32_t pixel) const {
   const auto width = static_cast<std::uint32_t>(params_.crop_width);
   return {params_.crop_x + static_cast<int>(pixel % width), params_.crop_y + static_cast<int>(pixel / width)};
@@ -84,8 +85,12 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size
     const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
     for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
       const FilterSample offset = filter_.sample(sobol_2d(sample, key));
-      const Ray ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
-      paths.push_back({ray, Rgb(offset.weight), pixel, sample, Layer::kSurface, {}});
+      Path path;
+      path.ray.ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
+      path.throughput = Rgb(offset.weight);
+      path.pixel = pixel;
+      path.sample = sample;
+      paths.push_back(path);
     }
   }
   return paths;
@@ -122,10 +127,11 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
     {
       const StageClock clock(totals.diffusion);
       for (const Path& path : paths) {
-        if (!path.hit || world_.shape(path.hit).medium != static_cast<int>(m)) continue;
+        if (!path.hit || path.depth >= depth_limit_ || world_.shape(path.hit).medium != static_cast<int>(m))
+          continue;
         hits.push_back(&path);
         points.push_back(
-            {surface_point(world_, path.hit), -path.ray.direction,
+            {path.hit, surface_point(world_, path.hit), -path.ray.ray.direction,
              pixel_key(path.pixel, 200 + hash_words(static_cast<std::uint64_t>(wave), path.branch)),
              path.sample});
       }
@@ -147,76 +153,51 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
   }
 }
 
+// Adds what a path meets on surfaces, and follows it on.
 void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const {
-  const Shape& shape = world_.shape(path.hit);
-  const Bsdf& bsdf = world_.bsdfs[path.hit.mesh];
-  const SurfacePoint point = surface_point(world_, path.hit);
-  const Vec3 out = -path.ray.direction;
-  const bool front = dot(point.geometric_normal, out) > 0;
-  if (shape.light != kNone && front) {
-    const auto& light =
-        std::get<AreaLight>(world_.scene->lights[static_cast<std::size_t>(shape.light)].model);
-    pixels.add(path.layer, path.pixel, path.throughput * light.radiance);
+  pixels.add(path.layer, path.pixel, path.throughput * emitted_radiance(world_, path.ray, path.hit));
+  if (!path.hit || path.depth >= depth_limit_) return;
+  ScatterPoint at = scatter_point(world_, path.hit, -path.ray.ray.direction);
+  Bsdf& bsdf = at.surface.bsdf;
+  const bool translucent = world_.shape(path.hit).medium != kNone;
+  const Layer layer = wave == 0 && translucent && bsdf.specular ? Layer::kSpecular : path.layer;
+  const std::uint64_t key =
+      pixel_key(path.pixel, hash_words(1, static_cast<std::uint64_t>(wave), path.branch));
+  if (bsdf.specular && !bsdf.rough() && wave < kSplitWaves && path.scattered == 0) {
+    // Light goes both ways, and into the base: first along all of them, deeper down along one.
+    const SmoothRays rays = smooth_rays(at, path.ray);
+    Path branch = path;
+    branch.branch = 2 * path.branch;
+    follow(branch, rays.reflected, layer, key, next);
+    ++branch.branch;
+    follow(branch, rays.transmitted, layer, key, next);
+    bsdf.specular = false;
   }
-  if (front) {
-    const std::uint64_t key = pixel_key(path.pixel, 1 + static_cast<std::uint64_t>(wave));
-    const auto first_sample = path.sample * static_cast<std::uint32_t>(light_samples_);
-    pixels.add(
-        path.layer, path.pixel,
-        path.throughput * (reflect_direct_light(world_, bsdf, point, out, light_samples_, key, first_sample) +
-                           reflect_bounced_light(bsdf, point, out, hash_words(key, 1), path.sample)));
-  }
-  if (bsdf.specular && (front || bsdf.transmits || shape.medium != kNone))
-    continue_specular(path, bsdf, point, wave, shape.medium != kNone, next);
+  const int samples = path.scattered == 0 ? light_samples_ : 1;
+  const Layer rest = bsdf.specular ? layer : path.layer;
+  pixels.add(rest, path.pixel,
+             path.throughput * reflect_direct_light(world_, at, samples, key,
+                                                    path.sample * static_cast<std::uint32_t>(samples),
+                                                    Continuation::kGoesOn));
+  follow(path, next_ray(world_, at, path.ray, samples, key, path.sample), rest, key, next);
 }
 
-// What a diffuse surface reflects of light that other surfaces send to it, by one ray; a direct integrator
-// leaves it out.
-Rgb PixelLoop::reflect_bounced_light(const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
-                                     std::uint64_t key, std::uint32_t sample) const {
-  const float cos_o = dot(point.shading_normal, out);
-  if (bounces_ <= 0 || is_black(bsdf.diffuse) || cos_o <= 0) return {0, 0, 0};
-  const Vec3 local = sample_cosine_hemisphere(sobol_2d(sample, key));
-  const Vec3 direction = make_frame(point.shading_normal).to_world(local);
-  if (local.z <= 0 || dot(direction, point.geometric_normal) <= 0) return {0, 0, 0};
-  // The cosine and its density leave pi.
-  return eval_diffuse(bsdf, local.z, cos_o) * kPi *
-         trace_bounced_light(world_, {point.origin(1), direction}, bounces_, hash_words(key, sample));
-}
-
-void PixelLoop::continue_specular(const Path& path, const Bsdf& bsdf, const SurfacePoint& point, int wave,
-                                  bool translucent, std::vector<Path>& next) const {
-  const Vec3 out = -path.ray.direction;
-  const bool front = dot(point.geometric_normal, out) > 0;
-  const float side = front ? 1.0f : -1.0f;
-  const float eta = front || translucent ? bsdf.eta : 1 / bsdf.eta;
-  const Vec3 normal = point.normal_towards(out);
-  const float reflectance = fresnel_reflectance(std::min(dot(normal, out), 1.0f), eta);
-  Path child = path;
-  if (translucent && wave == 0) child.layer = Layer::kSpecular;
-
-  // Glass sends light both ways, first along both of them, deeper down along one that is chosen by its
-  // reflectance; everything else only reflects.
-  float reflected = reflectance, refracted = bsdf.transmits ? 1 - reflectance : 0.0f;
-  if (bsdf.transmits && wave >= kSplitWaves) {
-    Rng rng(
-        hash_words(pixel_key(path.pixel, 100 + static_cast<std::uint64_t>(wave)), path.sample, path.branch));
-    const bool reflects = rng.next_float() < reflectance;
-    reflected = reflects ? 1.0f : 0.0f;
-    refracted = 1 - reflected;
+void PixelLoop::follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,
+                       std::vector<Path>& next) const {
+  Path path = from;
+  path.throughput *= ray.weight;
+  if (!(magnitude(path.throughput) > (ray.delta ? kLeastThroughput : 0.0f))) return;
+  path.ray = ray.ray;
+  path.layer = layer;
+  path.depth += !ray.delta || counts_mirrors_;
+  path.scattered += !ray.delta;
+  if (path.depth > kSureDepth) {  // Russian roulette
+    const float survive = std::min(0.95f, magnitude(path.throughput));
+    if (to_unit_float(static_cast<std::uint32_t>(hash_words(key, 3, path.sample, path.branch))) >= survive)
+      return;
+    path.throughput /= survive;
   }
-  Vec3 transmitted;
-  if (refracted > 0 && refract(out, normal, eta, transmitted)) {
-    Path through = child;
-    through.branch = 2 * path.branch + 1;
-    through.throughput *= bsdf.specular_transmittance * refracted;
-    through.ray = {point.origin(-side), transmitted.normalized()};
-    if (magnitude(through.throughput) > kLeastThroughput) next.push_back(through);
-  }
-  child.branch = 2 * path.branch;
-  child.throughput *= bsdf.specular_reflectance * reflected;
-  child.ray = {point.origin(side), reflect(out, normal).normalized()};
-  if (magnitude(child.throughput) > kLeastThroughput) next.push_back(child);
+  next.push_back(path);
 }
 
 }  // namespace nacre

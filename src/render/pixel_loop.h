@@ -6,6 +6,7 @@
 
 #include "nacre/base/report.h"
 #include "nacre/render/camera.h"
+#include "nacre/transport/path.h"
 #include "render/pixels.h"
 #include "render/translucency.h"
 
@@ -29,13 +30,15 @@ class PixelLoop {
  private:
   // A ray on its way, what it is worth and which layer it adds to.
   struct Path {
-    Ray ray;
-    Rgb throughput;
-    std::uint32_t pixel;   // index into the rendered rectangle
-    std::uint32_t sample;  // of the pixel
-    Layer layer;
+    PathRay ray;
+    Rgb throughput{1, 1, 1};
+    std::uint32_t pixel = 0;   // index into the rendered rectangle
+    std::uint32_t sample = 0;  // of the pixel
+    Layer layer = Layer::kSurface;
+    int depth = 1;             // edges that count towards the integrator's limit, this ray included
+    int scattered = 0;         // of them, how many come after a diffuse or rough surface
+    std::uint32_t branch = 1;  // which of the ways through mirrors and glass this one is
     Hit hit;
-    std::uint32_t branch = 1;  // which of the ways through glass this one is
   };
 
   std::array<int, 2> place(std::uint32_t pixel) const;
@@ -44,17 +47,16 @@ class PixelLoop {
   void record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const;
   void add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const;
   void shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const;
-  Rgb reflect_bounced_light(const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out, std::uint64_t key,
-                            std::uint32_t sample) const;
-  void continue_specular(const Path& path, const Bsdf& bsdf, const SurfacePoint& point, int wave,
-                         bool translucent, std::vector<Path>& next) const;
+  void follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,
+              std::vector<Path>& next) const;
 
   const World& world_;
   const RenderParams& params_;
   CameraRays camera_;
   FilterSampler filter_;
   int light_samples_;
-  int bounces_;
+  int depth_limit_, wave_limit_;
+  bool counts_mirrors_;              // whether mirrored and refracted edges count towards the limit
   std::vector<Translucency> media_;  // parallel to Scene::media
 };
 

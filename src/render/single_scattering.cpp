@@ -100,14 +100,14 @@ struct SingleScattering::Impl {
     const LightSegment segment = interior.trace_light(at, sample, crossings);
     ++lost.taken;
     lost.lost += segment.lost;
-    if (segment.blocked || segment.transmittance <= 0) return {0, 0, 0};
+    if (segment.blocked || is_black(segment.transmittance)) return {0, 0, 0};
     const float cosine = dot(segment.direction, inward);
-    float factor = segment.transmittance;
+    Rgb factor = segment.transmittance;
     if (conserving) factor *= segment.cos_entry / (eta * eta * segment.cos_refracted);
     Rgb value;
     for (int k = 0; k < 3; ++k)
       // Light travels along -direction and on along -inward: the cosine between them is that of the two.
-      value[k] = sample.irradiance[k] * factor * std::exp(-sigma_t[k] * segment.length) *
+      value[k] = sample.irradiance[k] * factor[k] * std::exp(-sigma_t[k] * segment.length) *
                  eval_henyey_greenstein(std::clamp(cosine, -1.0f, 1.0f), g[k]);
     return value;
   }

@@ -63,14 +63,15 @@ void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<R
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float cos_o = std::min(dot(points[i].surface.normal_towards(points[i].out), points[i].out), 1.0f);
-    radiance[i] *= (1 - fresnel_reflectance(cos_o, eta_)) * exit_factor_;
+    radiance[i] *= surface_albedo(world_, points[i].hit, false) *
+                   ((1 - fresnel_reflectance(cos_o, eta_)) * exit_factor_);
   }
 }
 
 Rgb Translucency::lambert_exitance(const ExitPoint& point) const {
   const float side = point.surface.side(point.out);
   const Receiver receiver{point.surface.position, point.surface.shading_normal * side,
-                          point.surface.origin(side), eta_};
+                          point.surface.origin(side), eta_, surface_albedo(world_, point.hit, true)};
   return total_ * estimate_irradiance(world_, receiver, light_samples_, bounces_,
                                       hash_words(point.key, kLambertLight),
                                       point.sample * static_cast<std::uint32_t>(light_samples_));
@@ -78,7 +79,8 @@ Rgb Translucency::lambert_exitance(const ExitPoint& point) const {
 
 Rgb Translucency::estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const {
   return single_->estimate(point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
-                           point.sample * static_cast<std::uint32_t>(single_samples_), lost);
+                           point.sample * static_cast<std::uint32_t>(single_samples_), lost) *
+         surface_albedo(world_, point.hit, false);
 }
 
 }  // namespace nacre

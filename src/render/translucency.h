@@ -17,6 +17,7 @@ namespace nacre {
 
 /// A point on the surface of a medium and where its random numbers come from.
 struct ExitPoint {
+  Hit hit;
   SurfacePoint surface;
   Vec3 out;              // unit, towards the eye
   std::uint64_t key;     // of the pixel

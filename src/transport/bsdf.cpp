@@ -106,16 +106,6 @@ Bounce bounce(const Bsdf& bsdf, const Configuration& c, const Vec3& m, float u_l
   return {transmitted, true, 1 - reflected};
 }
 
-BsdfSample sample_smooth(const Bsdf& bsdf, const Configuration& c, float u_lobe) {
-  const Bounce b = bounce(bsdf, c, {0, 0, 1}, u_lobe);
-  BsdfSample sample{b.in, {0, 0, 0}, 0, true, b.transmitted};
-  if (b.transmitted)
-    sample.weight = bsdf.specular_transmittance / (c.eta * c.eta);
-  else
-    sample.weight = reflectance(bsdf, c.out.z, c.eta) / b.probability;
-  return sample;
-}
-
 BsdfSample sample_continuous(const Bsdf& bsdf, const Configuration& c, Vec3 in, bool transmitted) {
   in.normalize();
   if (transmitted ? !(in.z < 0) : !(in.z > 0)) return {};
@@ -179,11 +169,33 @@ BsdfSample sample_bsdf(const Bsdf& bsdf, const Vec3& out, float u_lobe, const Ve
     const Bounce b = bounce(bsdf, c, m, u_lobe / boundary);
     sample = sample_continuous(bsdf, c, b.in, b.transmitted);
   } else {
-    sample = sample_smooth(bsdf, c, u_lobe / boundary);
-    sample.weight /= boundary;
+    // Glass by its reflectance, everything else only mirrors.
+    const SmoothWays ways = smooth_ways(bsdf, out);
+    const float mirrored = bsdf.transmits ? fresnel_reflectance(c.out.z, c.eta) : 1.0f;
+    const bool reflects = u_lobe < boundary * mirrored;
+    sample = reflects ? ways.reflected : ways.transmitted;
+    sample.weight /= boundary * (reflects ? mirrored : 1 - mirrored);
+    return sample;
   }
   sample.direction.z *= c.side;
   return sample;
+}
+
+SmoothWays smooth_ways(const Bsdf& bsdf, const Vec3& out) noexcept {
+  const Configuration c = configure(bsdf, out, out);
+  if (!c.reflects || !(c.out.z > 0) || !bsdf.specular || bsdf.rough()) return {};
+  const Vec3 normal(0, 0, 1);
+  SmoothWays ways;
+  ways.reflected = {reflect(c.out, normal), reflectance(bsdf, c.out.z, c.eta), 0, true, false};
+  ways.reflected.direction.z *= c.side;
+  Vec3 transmitted;
+  if (bsdf.transmits && refract(c.out, normal, c.eta, transmitted)) {
+    transmitted.z *= c.side;
+    const float share = 1 - fresnel_reflectance(c.out.z, c.eta);
+    ways.transmitted = {transmitted.normalized(), bsdf.specular_transmittance * (share / (c.eta * c.eta)), 0,
+                        true, true};
+  }
+  return ways;
 }
 
 }  // namespace nacre

@@ -9,30 +9,47 @@
 namespace nacre {
 namespace {
 
-Rgb direct_irradiance(const World& world, const Receiver& at, int samples, std::uint64_t key,
-                      std::uint32_t first_sample) {
+float transmittance(const Receiver& at, float cosine) {
+  return 1 - fresnel_reflectance(std::min(cosine, 1.0f), at.eta);
+}
+
+// By connections; where rays look for lights as well, weighted against `rays` of them by the power
+// heuristic.
+Rgb connected_irradiance(const World& world, const Receiver& at, int samples, int rays, std::uint64_t key,
+                         std::uint32_t first_sample) {
   Rgb sum(0, 0, 0);
   for_each_connection(
       world, at.position, at.normal, samples, key, first_sample, [&](const Connection& connection) {
-        const LightSample& sample = connection.sample;
-        const float cosine = dot(sample.direction, at.normal);
-        if (cosine > 0 && is_visible(world, at.origin, sample))
-          sum += sample.irradiance * (cosine * (1 - fresnel_reflectance(std::min(cosine, 1.0f), at.eta)));
+        const LightSample& light = connection.sample;
+        const float cosine = dot(light.direction, at.normal);
+        if (cosine <= 0) return;
+        const Visibility visibility = see_light(world, at.origin, light);
+        float weight = 1;
+        if (connection.density > 0 && !visibility.through_glass)
+          weight =
+              power_heuristic(connection.density, static_cast<float>(rays) * pdf_cosine_hemisphere(cosine));
+        sum += light.irradiance * visibility.transmittance * (weight * cosine * transmittance(at, cosine));
       });
   return sum;
 }
 
-Rgb bounced_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key,
-                       std::uint32_t first_sample) {
+Rgb gathered_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key,
+                        std::uint32_t first_sample, const TranslucentAnswer& answer) {
   const Frame frame = make_frame(at.normal);
   Rgb sum(0, 0, 0);
   for (int s = 0; s < samples; ++s) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(s);
     const Vec3 local = sample_cosine_hemisphere(sobol_2d(index, key));
     if (local.z <= 0) continue;
-    const Rgb radiance =
-        trace_bounced_light(world, {at.origin, frame.to_world(local)}, bounces, hash_words(key, index, 1));
-    sum += radiance * (kPi * (1 - fresnel_reflectance(local.z, at.eta)));
+    PathRay ray;
+    ray.ray = {at.origin, frame.to_world(local)};
+    ray.emission = world.shadows;
+    ray.density = static_cast<float>(samples) * pdf_cosine_hemisphere(local.z);
+    ray.position = at.position;
+    ray.normal = at.normal;
+    ray.light_samples = samples;
+    sum += trace_light(world, ray, bounces, hash_words(key, index, 1), answer) *
+           (kPi * transmittance(at, local.z));
   }
   return sum / static_cast<float>(samples);
 }
@@ -40,10 +57,13 @@ Rgb bounced_irradiance(const World& world, const Receiver& at, int samples, int 
 }  // namespace
 
 Rgb estimate_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key,
-                        std::uint32_t first_sample) noexcept {
-  Rgb sum = direct_irradiance(world, at, samples, hash_words(key, 0), first_sample);
-  if (bounces > 0) sum += bounced_irradiance(world, at, samples, bounces, hash_words(key, 1), first_sample);
-  return sum;
+                        std::uint32_t first_sample, const TranslucentAnswer& answer) {
+  const bool gathers = bounces > 0 || answer;
+  const int rays = gathers && world.shadows ? samples : 0;
+  Rgb sum = connected_irradiance(world, at, samples, rays, hash_words(key, 0), first_sample);
+  if (gathers)
+    sum += gathered_irradiance(world, at, samples, bounces, hash_words(key, 1), first_sample, answer);
+  return sum * at.albedo;
 }
 
 }  // namespace nacre

@@ -1,7 +1,10 @@
-// Direct and bounced light.
+// Sampling and choosing lights, and what lies on the way to them.
 #include "nacre/transport/light.h"
 
 #include <limits>
+
+#include "nacre/optics/fresnel.h"
+#include "nacre/transport/surface.h"
 
 namespace nacre {
 namespace {
@@ -127,13 +130,43 @@ Rgb environment_radiance(const World& world, const Vec3& direction) noexcept {
   return std::get<ConstantLight>(world.scene->lights[world.lights.environment].model).radiance;
 }
 
-bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
-  if (!world.shadows) return true;
-  if (std::isinf(sample.distance)) return !world.tracer.occluded({origin, sample.direction});
+Rgb pass_glass(const World& world, const Hit& hit, const Vec3& direction) noexcept {
+  const Bsdf& bsdf = world.bsdfs[hit.mesh];
+  if (!bsdf.transmits || bsdf.rough()) return {0, 0, 0};
+  const SurfacePoint point = surface_point(world, hit);
+  const float cosine = std::min(dot(point.normal_towards(direction), direction), 1.0f);
+  // Straight through: the angle is that outside, on either side.
+  const float reflectance = fresnel_reflectance(cosine, std::max(bsdf.eta, 1 / bsdf.eta));
+  return bsdf_at(world, hit).specular_transmittance * (1 - reflectance);
+}
+
+Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
+  Visibility visibility;
+  if (!world.shadows) return visibility;
   // Aimed from the origin itself, which lies off the surface, at the light's point and ending short of it by
   // more than rounding, so that the light's own surface does not count.
   constexpr float kReach = 1 - 1e-4f;
-  return !world.tracer.occluded({origin, sample.point - origin, 0, kReach});
+  const bool infinite = std::isinf(sample.distance);
+  Ray ray = infinite ? Ray{origin, sample.direction} : Ray{origin, sample.point - origin, 0, kReach};
+  if (world.tracer.occluded(ray, kBlockingMask)) {
+    visibility.transmittance = {0, 0, 0};
+    return visibility;
+  }
+  if (!world.has_glass) return visibility;
+  constexpr int kMostBoundaries = 256;
+  for (int n = 0; n < kMostBoundaries; ++n) {
+    const Hit hit = world.tracer.intersect(ray, kGlassMask);
+    if (!hit) return visibility;
+    visibility.transmittance *= pass_glass(world, hit, sample.direction);
+    visibility.through_glass = true;
+    const SurfacePoint point = surface_point(world, hit);
+    const Vec3 behind = point.origin(point.side(sample.direction));
+    if (is_black(visibility.transmittance) || !(dot(behind - ray.origin, sample.direction) > 0)) break;
+    ray.origin = behind;
+    if (!infinite) ray.direction = sample.point - behind;
+  }
+  visibility.transmittance = {0, 0, 0};
+  return visibility;
 }
 
 namespace {
@@ -201,52 +234,6 @@ Connection connect_to_chosen_light(const World& world, const Vec3& x, const Vec3
   return connect_to_light(
       world, choice.light, x, normal, sobol_2d(index, hash_words(key, 3)),
       static_cast<float>(samples * static_cast<double>(kMaxConnectedLights) * choice.probability));
-}
-
-Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
-                         int samples, std::uint64_t key, std::uint32_t first_sample) noexcept {
-  Rgb sum(0, 0, 0);
-  const float cos_o = dot(point.shading_normal, out);
-  if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) return sum;
-  const Vec3 origin = point.origin(1);
-  for_each_connection(world, point.position, point.shading_normal, samples, key, first_sample,
-                      [&](const Connection& connection) {
-                        const LightSample& sample = connection.sample;
-                        const float cos_i = dot(point.shading_normal, sample.direction);
-                        if (cos_i <= 0 || dot(point.geometric_normal, sample.direction) <= 0) return;
-                        if (is_visible(world, origin, sample))
-                          sum += eval_diffuse(bsdf, cos_i, cos_o) * sample.irradiance * cos_i;
-                      });
-  return sum;
-}
-
-Rgb trace_bounced_light(const World& world, Ray ray, int bounces, std::uint64_t key) noexcept {
-  Rgb sum(0, 0, 0), throughput(1, 1, 1);
-  for (int bounce = 1; bounce <= bounces; ++bounce) {
-    const Hit hit = world.tracer.intersect(ray);
-    if (!hit || world.shape(hit).medium != kNone) break;
-    const SurfacePoint point = surface_point(world, hit);
-    const Vec3 out = -ray.direction;
-    const Bsdf& bsdf = world.bsdfs[hit.mesh];
-    const float cos_o = dot(point.shading_normal, out);
-    if (is_black(bsdf.diffuse) || cos_o <= 0 || dot(point.geometric_normal, out) <= 0) break;
-    sum += throughput * reflect_direct_light(world, bsdf, point, out, 1,
-                                             hash_words(key, 2 * static_cast<unsigned>(bounce)), 0);
-    if (bounce == bounces) break;
-
-    Rng rng(hash_words(key, 2 * static_cast<unsigned>(bounce) + 1));
-    const Vec3 local = sample_cosine_hemisphere(rng.next_2d());
-    const Vec3 direction = make_frame(point.shading_normal).to_world(local);
-    if (local.z <= 0 || dot(direction, point.geometric_normal) <= 0) break;
-    throughput *= eval_diffuse(bsdf, local.z, cos_o) * kPi;  // the cosine and its density leave pi
-    const float survive = std::min(0.95f, max_channel(throughput));
-    if (bounce > 3) {  // Russian roulette
-      if (rng.next_float() >= survive) break;
-      throughput /= survive;
-    }
-    ray = {point.origin(1), direction};
-  }
-  return sum;
 }
 
 }  // namespace nacre

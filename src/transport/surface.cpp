@@ -4,7 +4,7 @@
 namespace nacre {
 namespace {
 
-constexpr float kHorizon = 1e-3f;  // least cosine to which directions and normals are brought back
+constexpr float kHorizon = 1e-3f;  // least cosine to which directions are brought back
 
 Rgb look_up(const Scene& scene, int texture, const Vec2& uv) {
   return eval_texture(scene.textures[static_cast<std::size_t>(texture)], uv);
@@ -57,10 +57,7 @@ Rgb surface_albedo(const World& world, const Hit& hit, bool entry) noexcept {
 
 SurfaceBsdf surface_at(const World& world, const Hit& hit, const SurfacePoint& point,
                        const Vec3& out) noexcept {
-  Vec3 normal = point.shading_normal;
-  const float side = side_of(point.geometric_normal, out);
-  const float cosine = side * dot(normal, out);
-  if (cosine < kHorizon) normal = (normal + out * (side * (kHorizon - cosine))).normalized();
+  const Vec3 normal = point.normal_towards(out) * point.side(out);
   SurfaceBsdf surface{bsdf_at(world, hit), {}, point.geometric_normal};
   const Roughness& roughness = surface.bsdf.roughness;
   surface.frame =
@@ -78,9 +75,10 @@ float pdf_bsdf(const SurfaceBsdf& surface, const Vec3& in, const Vec3& out) noex
   return pdf_bsdf(surface.bsdf, surface.frame.to_local(in), surface.frame.to_local(out));
 }
 
-BsdfSample sample_bsdf(const SurfaceBsdf& surface, const Vec3& out, float u_lobe, const Vec2& u) noexcept {
-  if (leaks(surface, out)) return {};
-  BsdfSample sample = sample_bsdf(surface.bsdf, surface.frame.to_local(out), u_lobe, u);
+namespace {
+
+// A sample of the local frame in the world.
+BsdfSample place(const SurfaceBsdf& surface, const Vec3& out, BsdfSample sample) {
   if (is_black(sample.weight)) return {};
   sample.direction = surface.frame.to_world(sample.direction).normalized();
   const Vec3& normal = surface.geometric_normal;
@@ -90,6 +88,19 @@ BsdfSample sample_bsdf(const SurfaceBsdf& surface, const Vec3& out, float u_lobe
   if (!sample.delta) return {};
   sample.direction = (sample.direction + normal * (side * (kHorizon - cosine))).normalized();
   return sample;
+}
+
+}  // namespace
+
+BsdfSample sample_bsdf(const SurfaceBsdf& surface, const Vec3& out, float u_lobe, const Vec2& u) noexcept {
+  if (leaks(surface, out)) return {};
+  return place(surface, out, sample_bsdf(surface.bsdf, surface.frame.to_local(out), u_lobe, u));
+}
+
+SmoothWays smooth_ways(const SurfaceBsdf& surface, const Vec3& out) noexcept {
+  if (leaks(surface, out)) return {};
+  const SmoothWays ways = smooth_ways(surface.bsdf, surface.frame.to_local(out));
+  return {place(surface, out, ways.reflected), place(surface, out, ways.transmitted)};
 }
 
 }  // namespace nacre

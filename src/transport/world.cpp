@@ -6,14 +6,21 @@
 namespace nacre {
 
 World make_world(const Scene& scene, bool shadows) {
+  std::vector<Bsdf> bsdfs;
   std::vector<const Mesh*> meshes;
-  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  World world{&scene, RayTracer(meshes), {}, make_light_table(scene), shadows};
-  for (const Shape& shape : scene.shapes)
-    world.bsdfs.push_back(
+  std::vector<std::uint32_t> masks;
+  bool has_glass = false;
+  for (const Shape& shape : scene.shapes) {
+    const Bsdf bsdf =
         make_bsdf(shape.surface == kNone ? nullptr : &scene.surfaces[static_cast<std::size_t>(shape.surface)],
-                  shape.medium == kNone ? nullptr : &scene.media[static_cast<std::size_t>(shape.medium)]));
-  return world;
+                  shape.medium == kNone ? nullptr : &scene.media[static_cast<std::size_t>(shape.medium)]);
+    const bool glass = bsdf.transmits && !bsdf.rough();
+    has_glass = has_glass || glass;
+    bsdfs.push_back(bsdf);
+    meshes.push_back(&shape.mesh);
+    masks.push_back(glass ? kGlassMask : kBlockingMask);
+  }
+  return {&scene, RayTracer(meshes, masks), std::move(bsdfs), make_light_table(scene), shadows, has_glass};
 }
 
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {

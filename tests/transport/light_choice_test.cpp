@@ -203,7 +203,7 @@ TEST(LightChoice, DensitiesServeMultipleImportanceSampling) {
       double value[3] = {};
       for_each_connection(world, x, normal, 1, hash_words(r, 1), 0, [&](const Connection& c) {
         const float cosine = dot(c.sample.direction, normal);
-        if (cosine <= 0 || !is_visible(world, x, c.sample)) return;
+        if (cosine <= 0 || is_black(see_light(world, x, c.sample).transmittance)) return;
         const auto part = static_cast<double>(c.sample.irradiance.x * cosine);
         const auto by_rays = static_cast<double>(pdf_cosine_hemisphere(cosine));
         value[0] += part;

@@ -1,6 +1,6 @@
 // label: analytic
 // Connections to lights integrate to what is known, and bounced light to closed forms.
-#include "nacre/transport/light.h"
+#include "nacre/transport/path.h"
 
 #include <gtest/gtest.h>
 
@@ -79,7 +79,7 @@ TEST(Light, SamplesLieOnTheLight) {
     const Vec3 p = x + sample.direction * sample.distance;
     EXPECT_NEAR(p.z, -1, 1e-5);
     EXPECT_LE(std::max(std::abs(p.x), std::abs(p.y)), 0.5f + 1e-5f);
-    EXPECT_TRUE(is_visible(world, x, sample));  // its own surface is no obstacle
+    EXPECT_EQ(see_light(world, x, sample).transmittance, Rgb(1, 1, 1));  // its own surface is no obstacle
   }
 }
 
@@ -105,10 +105,10 @@ TEST(Light, Visibility) {
   add_shape(scene, placed(make_rectangle(), 1, {0, 0, 1}));
   const World world = make_world(scene, true), open = make_world(scene, false);
   for (const std::size_t light : {0u, 1u}) {
-    EXPECT_FALSE(is_visible(world, Vec3(0), sample_light(world, light, Vec3(0), {})));
-    EXPECT_TRUE(is_visible(open, Vec3(0), sample_light(open, light, Vec3(0), {})));
+    EXPECT_TRUE(is_black(see_light(world, Vec3(0), sample_light(world, light, Vec3(0), {})).transmittance));
+    EXPECT_FALSE(is_black(see_light(open, Vec3(0), sample_light(open, light, Vec3(0), {})).transmittance));
     const Vec3 above(0, 0, 1.5f);
-    EXPECT_TRUE(is_visible(world, above, sample_light(world, light, above, {})));
+    EXPECT_FALSE(is_black(see_light(world, above, sample_light(world, light, above, {})).transmittance));
   }
 }
 
@@ -134,13 +134,16 @@ TEST(Light, DirectlyReflectedFromAFloor) {
   add_directional_light(scene, Vec3(0, 0.6f, -0.8f), Rgb(2, 2, 2));
   const World world = make_world(scene, true);
   const Ray down{{0.1f, 0.2f, 3}, {0, 0, -1}};
-  const SurfacePoint point = surface_point(world, world.tracer.intersect(down));
+  const auto reflect = [&](const Vec3& out) {
+    return reflect_direct_light(world, scatter_point(world, world.tracer.intersect(down), out), 4, 1, 0,
+                                Continuation::kEnds);
+  };
   for (const float z : {0.1f, 1.0f}) {
     const Vec3 out = Vec3(0.3f, 0, z).normalized();
-    const Rgb radiance = reflect_direct_light(world, world.bsdfs[0], point, out, 4, 1, 0);
+    const Rgb radiance = reflect(out);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(radiance[k], albedo[k] * 2 * 0.8f / kPi, 1e-5);
   }
-  EXPECT_TRUE(is_black(reflect_direct_light(world, world.bsdfs[0], point, {0, 0, -1}, 4, 1, 0)));
+  EXPECT_TRUE(is_black(reflect({0, 0, -1})));
 }
 
 // Under an even sky the albedo is what comes back, and nothing of it is noise.
@@ -150,8 +153,9 @@ TEST(Light, ReflectedSky) {
   add_shape(scene, placed(make_rectangle(), 10, Vec3(0)), add_diffuse(scene, albedo));
   add_constant_light(scene, Rgb(2, 2, 2));
   const World world = make_world(scene, true);
-  const SurfacePoint point = surface_point(world, world.tracer.intersect({{0.1f, 0.2f, 3}, {0, 0, -1}}));
-  const Rgb radiance = reflect_direct_light(world, world.bsdfs[0], point, {0, 0.6f, 0.8f}, 1, 1, 0);
+  const ScatterPoint at =
+      scatter_point(world, world.tracer.intersect({{0.1f, 0.2f, 3}, {0, 0, -1}}), {0, 0.6f, 0.8f});
+  const Rgb radiance = reflect_direct_light(world, at, 1, 1, 0, Continuation::kEnds);
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(radiance[k], albedo[k] * 2, 1e-5);
 }
 
@@ -185,17 +189,24 @@ TEST(Light, FarAndTinyAreaLightsGiveNumbers) {
   }
 }
 
+Rgb bounced(const World& world, const Ray& ray, int bounces, std::uint64_t key) {
+  PathRay path;
+  path.ray = ray;
+  path.emission = false;
+  return trace_light(world, path, bounces, key);
+}
+
 TEST(Light, BouncedLightMissesAndStops) {
   Scene scene;
   add_shape(scene, make_rectangle(), add_diffuse(scene, Rgb(0.5f, 0.5f, 0.5f)));
   add_directional_light(scene, Vec3(0, 0, -1), Rgb(kPi, kPi, kPi));
   add_area_light(scene, placed(flipped(make_rectangle()), 1e-3f, {50, 0, 5}), Rgb(1000, 1000, 1000));
   const World world = make_world(scene, true);
-  EXPECT_NEAR(trace_bounced_light(world, {{0, 0, 1}, {0, 0, -1}}, 1, 5).x, 0.5f, 0.01f);
-  EXPECT_TRUE(is_black(trace_bounced_light(world, {{0, 0, 1}, {0, 0, -1}}, 0, 5)));
-  EXPECT_TRUE(is_black(trace_bounced_light(world, {{3, 0, 1}, {0, 0, -1}}, 1, 5)));  // past it
-  EXPECT_TRUE(is_black(trace_bounced_light(world, {{0, 0, -1}, {0, 0, 1}}, 1, 5)));  // from behind
-  EXPECT_TRUE(is_black(trace_bounced_light(world, {{50, 0, 1}, {0, 0, 1}}, 1, 5)));  // emission is no bounce
+  EXPECT_NEAR(bounced(world, {{0, 0, 1}, {0, 0, -1}}, 1, 5).x, 0.5f, 0.01f);
+  EXPECT_TRUE(is_black(bounced(world, {{0, 0, 1}, {0, 0, -1}}, 0, 5)));
+  EXPECT_TRUE(is_black(bounced(world, {{3, 0, 1}, {0, 0, -1}}, 1, 5)));  // past it
+  EXPECT_TRUE(is_black(bounced(world, {{0, 0, -1}, {0, 0, 1}}, 1, 5)));  // from behind
+  EXPECT_TRUE(is_black(bounced(world, {{50, 0, 1}, {0, 0, 1}}, 1, 5)));  // emission is no bounce
 }
 
 // Between two parallel planes that fill each other's hemisphere, the lower one lit evenly with E: radiance
@@ -212,7 +223,7 @@ TEST(Light, BouncesBetweenTwoPlanes) {
     Rgb sum(0, 0, 0);
     constexpr int kPaths = 100000;
     for (std::uint64_t s = 0; s < kPaths; ++s)
-      sum += trace_bounced_light(world, {{0, 0, 0.5f}, {0, 0.6f, -0.8f}}, bounces, hash_words(s, 8)) / kPaths;
+      sum += bounced(world, {{0, 0, 0.5f}, {0, 0.6f, -0.8f}}, bounces, hash_words(s, 8)) / kPaths;
     for (int k = 0; k < 3; ++k) {
       const double a = static_cast<double>(albedo[k]);
       double expected = 0;

@@ -8,7 +8,7 @@
 #include "nacre/base/progress.h"
 #include "nacre/base/report.h"
 #include "nacre/cache/cache.h"
-#include "nacre/transport/world.h"
+#include "nacre/transport/path.h"
 
 namespace nacre {
 
@@ -19,6 +19,7 @@ struct BakeParams {
       irradiance_samples;      // per point and light; none: the scene's, else kDefaultIrradianceSamples
   std::optional<int> bounces;  // of light between opaque surfaces; none: what the scene's integrator gives
   bool shadows = true;
+  bool interreflect = false;  // whether translucent objects light themselves and each other
   std::uint64_t seed = 0;
 };
 
@@ -45,8 +46,10 @@ struct BakePlan {
 /// translucent or one has no surface.
 BakePlan plan_bake(const Scene& scene, const BakeParams& params);
 
-/// Places samples on every translucent group and computes the transmitted irradiance there. Depends on scene
-/// and params alone, not on threads.
+/// Places samples on every translucent group and computes the transmitted irradiance there. With interreflect
+/// it then adds, twice over, what the groups' exitance sends to all of them, directly and by bounces; what is
+/// missing after that has been through translucent objects three times. Depends on scene and params alone,
+/// not on threads.
 Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, Progress& progress,
            Report& report);
 
@@ -55,12 +58,12 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
 struct ReceiverPoints {
   std::span<const Vec3> positions, normals;
   std::span<const float> extents;
+  std::span<const Rgb> albedos = {};  // of the surface on the way in (surface_albedo); empty: 1
 };
 
-/// Irradiance E_t transmitted at points into a medium of relative index eta, from every light with `samples`
-/// connections to each light that has an extent and, with bounces, `samples` rays for light off opaque
-/// surfaces.
+/// Irradiance E_t transmitted at points into a medium of relative index eta (estimate_irradiance).
 std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
-                                    int bounces, std::uint64_t seed, Progress& progress);
+                                    int bounces, std::uint64_t seed, Progress& progress,
+                                    const TranslucentAnswer& answer = {});
 
 }  // namespace nacre

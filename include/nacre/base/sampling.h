@@ -27,6 +27,15 @@ Vec2 sample_uniform_triangle(const Vec2& u) noexcept;
 inline float sample_exponential(float rate, float u) noexcept { return -std::log1p(-u) / rate; }
 inline float pdf_exponential(float rate, float t) noexcept { return rate * std::exp(-rate * t); }
 
+/// Weight of a sample of density `chosen` where another way of sampling would have found it with density
+/// `other`, both times their numbers of samples: the power heuristic with exponent 2, which lets the denser
+/// way have nearly all. Source: Veach 1997, section 9.2.
+inline float power_heuristic(float chosen, float other) noexcept {
+  // By their ratio: squares of densities may overflow.
+  const float ratio = other / chosen;
+  return 1 / (1 + ratio * ratio);
+}
+
 /// A discrete distribution by its cumulative weights.
 class Distribution {
  public:

@@ -10,11 +10,16 @@ namespace nacre {
 
 /// The parts of a scene that a cache depends on: content of each shape, not its file's name ("shape
 /// bunny/geometry"), which group it belongs to, lights ("light key/position"), eta of each medium, shadows,
-/// bounces and, where light bounces, reflectances. `bounces[m]` is the number of bounces baked for medium m.
-KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows);
+/// bounces and, where light bounces, reflectances; with interreflection the coefficients of the media, too.
+/// `bounces[m]` is the number of bounces baked for medium m.
+KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows,
+                           bool interreflect = false);
 
 /// The bounces that a fingerprint was made with, for `groups` media; missing ones are 0.
 std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups);
+
+/// Whether it was made with interreflection.
+bool fingerprint_interreflects(const KeyValues& fingerprint);
 
 /// A 32-digit hash of a fingerprint.
 std::string fingerprint_digest(const KeyValues& fingerprint);

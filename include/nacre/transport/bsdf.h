@@ -74,4 +74,10 @@ float pdf_bsdf(const Bsdf& bsdf, const Vec3& in, const Vec3& out) noexcept;
 /// Chooses a part of the bsdf by `u_lobe` and a direction by `u`.
 BsdfSample sample_bsdf(const Bsdf& bsdf, const Vec3& out, float u_lobe, const Vec2& u) noexcept;
 
+/// Both ways of light at a smooth boundary: mirrored, and let through. Black where there is none.
+struct SmoothWays {
+  BsdfSample reflected, transmitted;
+};
+SmoothWays smooth_ways(const Bsdf& bsdf, const Vec3& out) noexcept;
+
 }  // namespace nacre

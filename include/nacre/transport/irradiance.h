@@ -3,23 +3,26 @@
 
 #include <cstdint>
 
-#include "nacre/transport/world.h"
+#include "nacre/transport/path.h"
 
 namespace nacre {
 
 /// A point on the boundary of a medium.
 struct Receiver {
   Vec3 position;
-  Vec3 normal;  // unit, outward
-  Vec3 origin;  // just off the surface on that side (offset_from_surface)
-  float eta;    // relative index of the medium
+  Vec3 normal;          // unit, outward
+  Vec3 origin;          // just off the surface on that side (offset_from_surface)
+  float eta;            // relative index of the medium
+  Rgb albedo{1, 1, 1};  // of its surface, on the way in (surface_albedo)
 };
 
 /// Estimates the transmitted irradiance E_t at a receiver: from every light, by `samples` connections to each
-/// area light, and, with bounces, by `samples` rays for what opaque surfaces reflect. `key` chooses the
-/// sequences of sample points, `first_sample` where in them to begin, so that estimates of one sample each
-/// with successive numbers are as well distributed as a single one of many.
+/// (one if it has a single direction), and, with bounces or an answer, by `samples` rays for what opaque
+/// surfaces and, if there is an `answer`, translucent ones send. Where both find a light they are weighted
+/// against each other. `key` chooses the sequences of sample points, `first_sample` where in them to begin,
+/// so that estimates of one sample each with successive numbers are as well distributed as a single one of
+/// many.
 Rgb estimate_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key,
-                        std::uint32_t first_sample = 0) noexcept;
+                        std::uint32_t first_sample = 0, const TranslucentAnswer& answer = {});
 
 }  // namespace nacre

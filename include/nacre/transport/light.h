@@ -37,9 +37,18 @@ float pdf_light(const World& world, std::size_t light, const Vec3& x, const Vec3
 /// around.
 Rgb environment_radiance(const World& world, const Vec3& direction) noexcept;
 
-/// Whether nothing lies between `origin`, a point just off a surface (offset_from_surface), and a light
-/// sample taken on that surface. Always true when the world has no shadows.
-bool is_visible(const World& world, const Vec3& origin, const LightSample& sample) noexcept;
+/// What of a light's sample arrives.
+struct Visibility {
+  Rgb transmittance{1, 1, 1};
+  bool through_glass = false;
+};
+/// What lies between `origin`, a point just off a surface (offset_from_surface), and a light sample taken on
+/// that surface. Clear glass, which is a smooth dielectric without a medium, lets light through straight on,
+/// less its Fresnel reflection at each boundary; everything else blocks it. Nothing does when the world has
+/// no shadows.
+Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample) noexcept;
+/// Transmittance of a boundary of clear glass for a straight ray; black for any other surface.
+Rgb pass_glass(const World& world, const Hit& hit, const Vec3& direction) noexcept;
 
 /// Chooses one light by what each may send to x, judged by power, distance and direction; u in [0, 1).
 LightChoice choose_light(const World& world, const Vec3& x, double u,
@@ -98,16 +107,5 @@ void for_each_connection(const World& world, const Vec3& x, const Vec3& normal, 
                               static_cast<float>(count)));
   }
 }
-
-/// Light that opaque surfaces reflect towards the origin of a ray after one to `bounces` bounces: what the
-/// ray's first opaque hit scatters directly plus, beyond one bounce, what arrives there the same way.
-/// Emission itself, which connections to lights count, is left out, and translucent surfaces reflect nothing.
-/// Unbiased; one path.
-Rgb trace_bounced_light(const World& world, Ray ray, int bounces, std::uint64_t key) noexcept;
-
-/// Radiance that the diffuse part of an opaque surface sends towards direction `out` directly from all
-/// lights, by `samples` connections to each (for_each_connection); key chooses the samples.
-Rgb reflect_direct_light(const World& world, const Bsdf& bsdf, const SurfacePoint& point, const Vec3& out,
-                         int samples, std::uint64_t key, std::uint32_t first_sample) noexcept;
 
 }  // namespace nacre

@@ -21,17 +21,18 @@ struct SurfaceBsdf {
   Vec3 geometric_normal;
 };
 
-/// The surface as `out`, the unit direction to where light goes, sees it: where interpolation turns the
-/// normal away from `out`, it is bent back until `out` is just above the horizon.
+/// The surface as `out`, the unit direction to where light goes, sees it: its normal is
+/// SurfacePoint::normal_towards that, turned to the front.
 SurfaceBsdf surface_at(const World& world, const Hit& hit, const SurfacePoint& point,
                        const Vec3& out) noexcept;
 
 /// eval_bsdf, pdf_bsdf and sample_bsdf for unit directions in world space. Black and 0 for directions that
-/// lie on different sides of the shading and the geometric normal. A mirrored or refracted one that does is
-/// brought back to the plane of the triangle, so that mirrors have no dark rims. A sample's ray starts at
+/// lie on different sides of the shading and the geometric normal. A refracted one that does is brought back
+/// to the plane of the triangle, so that glass has no dark rims. A sample's ray starts at
 /// SurfacePoint::origin of the side on which its direction lies.
 Rgb eval_bsdf(const SurfaceBsdf& surface, const Vec3& in, const Vec3& out) noexcept;
 float pdf_bsdf(const SurfaceBsdf& surface, const Vec3& in, const Vec3& out) noexcept;
 BsdfSample sample_bsdf(const SurfaceBsdf& surface, const Vec3& out, float u_lobe, const Vec2& u) noexcept;
+SmoothWays smooth_ways(const SurfaceBsdf& surface, const Vec3& out) noexcept;
 
 }  // namespace nacre
