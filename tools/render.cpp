@@ -17,7 +17,8 @@ struct Options {
   CommonOptions common;
   SceneOptions scene;
   BakeOptions bake;
-  std::string output, cache, camera, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  std::string output, cache, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  std::vector<std::string> cameras;
   int samples_per_pixel = 0;
   double tolerance = 0.01;
   std::optional<int> single_samples, mc_samples;
@@ -74,8 +75,8 @@ void parse_crop(const std::string& text, RenderParams& params) {
   params.crop_height = size[1];
 }
 
-RenderParams make_params(const Options& options, const Scene& scene) {
-  const std::size_t camera = options.camera.empty() ? 0 : find_camera(scene, options.camera, "--camera");
+RenderParams make_params(const Options& options, const Scene& scene, const std::string& id) {
+  const std::size_t camera = id.empty() ? 0 : find_camera(scene, id, "--camera");
   RenderParams params = default_render_params(scene, camera);
   if (!options.size.empty()) {
     const auto size = parse_size(options.size, "--size");
@@ -189,22 +190,60 @@ Cache make_cache(const Options& options, const RenderParams& params, const World
   return cache;
 }
 
+// One picture: whose it is and where it goes.
+struct Picture {
+  std::string camera;  // "": the first
+  std::string path, preview;
+};
+
+// One for each camera, with its id in the names if there are several. Fails if one cannot be written.
+std::vector<Picture> plan_pictures(const Options& options) {
+  std::vector<std::string> cameras = options.cameras;
+  if (cameras.empty()) cameras.emplace_back();
+  std::vector<Picture> pictures;
+  for (const std::string& camera : cameras) {
+    const std::filesystem::path output(options.output);
+    std::string name = output.stem().string();
+    if (cameras.size() > 1) name += "." + camera;
+    std::ranges::replace(name, '/', '_');
+    const auto beside = [&](const std::string& ending) {
+      return std::filesystem::path(output).replace_filename(name + ending).string();
+    };
+    const Picture picture{camera, beside(output.extension().string()), beside(".png")};
+    for (const Picture& other : pictures)
+      if (other.path == picture.path)
+        throw UsageError("--camera " + camera + ": two pictures would be written to " + picture.path);
+    pictures.push_back(picture);
+  }
+  const std::vector<std::string> inputs{options.scene.path, options.cache};
+  for (const Picture& picture : pictures) {
+    check_writable(picture.path, inputs);
+    if (!options.png) continue;
+    if (picture.preview == picture.path)
+      throw UsageError("-o " + options.output + ": --png writes there; name the picture .exr");
+    check_writable(picture.preview, inputs);
+  }
+  return pictures;
+}
+
+void save_picture(const Image& image, const Picture& picture, const Options& options,
+                  std::optional<double> exposure, Session& session) {
+  const StageTimer timer(session.report(), "write_image");
+  save_exr(image, picture.path);
+  if (options.png) save_png(image, picture.preview, exposure ? *exposure : auto_exposure(image));
+  session.progress().say(options.png ? picture.path + " and " + picture.preview : picture.path);
+}
+
 void run(const Options& options, const std::string& command_line) {
   const bool cached = options.method == "hierarchical" || options.method == "exact";
   check_combination(options, cached);
   const std::optional<double> exposure = parse_exposure(options.exposure);
-  const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
   Session session(options.common, command_line);
-  const std::vector<std::string> inputs{options.scene.path, options.cache};
-  check_writable(options.output, inputs);
-  if (options.png) {
-    if (preview == options.output)
-      throw UsageError("-o " + options.output + ": --png writes there; name the picture .exr");
-    check_writable(preview, inputs);
-  }
+  const std::vector<Picture> pictures = plan_pictures(options);
 
   const Scene scene = load_scene(options.scene, session);
-  const RenderParams params = make_params(options, scene);
+  std::vector<RenderParams> params;
+  for (const Picture& picture : pictures) params.push_back(make_params(options, scene, picture.camera));
   const BakeParams bake_params = options.bake.params(options.common);
   session.warn(check_single_scattering(scene, options));
   if (cached && options.cache.empty() && !scene.media.empty()) plan_bake(scene, bake_params);
@@ -212,22 +251,19 @@ void run(const Options& options, const std::string& command_line) {
     const StageTimer timer(session.report(), "build_bvh");
     return make_world(scene, bake_params.shadows);
   }();
-  const Cache cache = make_cache(options, params, world, bake_params, session);
+  const Cache cache = make_cache(options, params[0], world, bake_params, session);
   if (cached) session.warn(check_density(scene, cache));
 
-  Warnings warnings;
-  Image image = render(world, cache, params, session.progress(), session.report(), warnings);
-  session.warn(warnings);
-  image.metadata = {{"nacre:version", kVersion},
-                    {"nacre:command", command_line},
-                    {"nacre:seed", fmt::format("{}", options.common.seed)},
-                    {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
-  {
-    const StageTimer timer(session.report(), "write_image");
-    save_exr(image, options.output);
-    if (options.png) save_png(image, preview, exposure ? *exposure : auto_exposure(image));
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    Warnings warnings;
+    Image image = render(world, cache, params[i], session.progress(), session.report(), warnings);
+    session.warn(warnings);
+    image.metadata = {{"nacre:version", kVersion},
+                      {"nacre:command", command_line},
+                      {"nacre:seed", fmt::format("{}", options.common.seed)},
+                      {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
+    save_picture(image, pictures[i], options, exposure, session);
   }
-  session.progress().say(options.png ? options.output + " and " + preview : options.output);
   session.finish();
 }
 
@@ -239,7 +275,12 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
   add_scene_options(*command, options->scene);
   command->add_option("-o,--output", options->output, "OpenEXR file to write")->required();
   command->add_option("--cache", options->cache, "Cache that `nacre bake` made (default: bake in memory)");
-  command->add_option("--camera", options->camera, "Id of the camera (default: the first)");
+  command
+      ->add_option("--camera", options->cameras,
+                   "Id of the camera (default: the first); several, one picture each, by commas or --camera "
+                   "again: their ids go into the names of the pictures")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_option("--size", options->size, "WIDTHxHEIGHT of the picture (default: the film's)");
   command->add_option("--crop", options->crop, "X,Y,WIDTHxHEIGHT: render this part of the picture only");
   command->add_option("--spp", options->samples_per_pixel, "Samples per pixel (default: the sampler's)")

@@ -15,6 +15,9 @@ constexpr int kSplitWaves = 4, kSureDepth = 5;
 // The share of a pixel below which a way is not followed.
 constexpr float kLeastThroughput = 1e-4f;
 
+// Filters have negative weights, too.
+float magnitude(const Rgb& throughput) { return std::max(max_channel(throughput), max_channel(-throughput)); }
+
 // Adds the time of its life to a sum over threads.
 class StageClock {
  public:
@@ -77,13 +80,14 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size
   std::vector<Path> paths;
   paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
   for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
-    const std::uint64_t key = pixel_key(pixel, 0);
+    const std::uint64_t key = pixel_key(pixel, 0), lens_key = hash_words(key, 1);
     const auto [x, y] = place(pixel);
     const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
     for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
-      const Vec2 at = centre + filter_.sample(sobol_2d(sample, key));
+      const FilterSample offset = filter_.sample(sobol_2d(sample, key));
       Path path;
-      path.ray.ray = camera_.at(at);
+      path.ray.ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
+      path.throughput = Rgb(offset.weight);
       path.pixel = pixel;
       path.sample = sample;
       paths.push_back(path);
@@ -96,7 +100,7 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels)
   for (Path& path : paths) {
     if (!path.hit) continue;
     const std::size_t index = path.pixel;
-    pixels.coverage[index] += 1;
+    pixels.coverage[index] += path.throughput.x;  // the weight of the filter
     if (path.sample != 0) continue;
     const SurfacePoint point = surface_point(world_, path.hit);
     pixels.position[index] = point.position;
@@ -182,13 +186,13 @@ void PixelLoop::follow(const Path& from, const NextRay& ray, Layer layer, std::u
                        std::vector<Path>& next) const {
   Path path = from;
   path.throughput *= ray.weight;
-  if (!(max_channel(path.throughput) > (ray.delta ? kLeastThroughput : 0.0f))) return;
+  if (!(magnitude(path.throughput) > (ray.delta ? kLeastThroughput : 0.0f))) return;
   path.ray = ray.ray;
   path.layer = layer;
   path.depth += !ray.delta || counts_mirrors_;
   path.scattered += !ray.delta;
   if (path.depth > kSureDepth) {  // Russian roulette
-    const float survive = std::min(0.95f, max_channel(path.throughput));
+    const float survive = std::min(0.95f, magnitude(path.throughput));
     if (to_unit_float(static_cast<std::uint32_t>(hash_words(key, 3, path.sample, path.branch))) >= survive)
       return;
     path.throughput /= survive;

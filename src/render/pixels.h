@@ -17,7 +17,7 @@ struct PixelBuffer {
 
   int width, height;
   std::array<std::vector<Rgb>, kLayerCount> layers;
-  std::vector<float> coverage;  // samples that hit anything
+  std::vector<float> coverage;  // filter weights of the samples that hit anything
   std::vector<Vec3> position, normal;
   std::vector<float> depth, object_id;
 

@@ -38,7 +38,8 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
   Stopwatch watch;
   Stopwatch setup;
   const PixelLoop loop(world, cache, params);
-  report.seconds["diffusion"] += setup.seconds();  // tabulated profiles
+  const double setup_seconds = setup.seconds();  // tabulated profiles
+  report.seconds["diffusion"] += setup_seconds;
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
   const std::size_t per_task =
@@ -56,7 +57,7 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
 
   // Stages are sums over threads; what the threads spent between them (waiting for the last row) is shared
   // out alike.
-  const double loop_seconds = watch.seconds() - report.seconds["diffusion"];
+  const double loop_seconds = watch.seconds() - setup_seconds;
   const double busy = totals.primary + totals.diffusion + totals.single + totals.surface;
   const double share = busy > 0 ? loop_seconds / busy : 0;
   report.seconds["primary_rays"] += totals.primary * share;

@@ -43,5 +43,9 @@ SensorElement read_sensor(const XmlElement& element, Warnings& warnings);
 Integrator read_integrator(const XmlElement& element, Warnings& warnings);
 /// The mesh of a <shape> in world space: type, file and transforms, not what stands inside it.
 Mesh read_mesh(const XmlElement& element, Warnings& warnings);
+/// Moves a mesh to where it belongs, as far as world space reaches. `transform_place` is that of the
+/// transform.
+void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transform_place,
+                const std::string& place);
 
 }  // namespace nacre

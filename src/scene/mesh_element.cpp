@@ -1,8 +1,10 @@
 // <shape>: mesh files and built-in shapes, brought into world space with the normals that were asked for.
 #include <algorithm>
+#include <limits>
 
 #include "nacre/geometry/mesh_file.h"
 #include "nacre/geometry/primitives.h"
+#include "nacre/geometry/serialized_file.h"
 #include "nacre/geometry/subdivide.h"
 #include "scene/elements.h"
 #include "scene/parameters.h"
@@ -11,7 +13,13 @@
 namespace nacre {
 namespace {
 
-Mesh load_mesh_of_type(Parameters& parameters, const std::string& type, Warnings& warnings) {
+// In the shape's own space; file meshes without normals get them later, in world space.
+struct ShapeMesh {
+  Mesh mesh;
+  bool face_normals = false;  // unless the scene file says otherwise
+};
+
+ShapeMesh load_mesh_of_type(Parameters& parameters, const std::string& type, Warnings& warnings) {
   const std::string name = parameters.string("filename", "");
   const std::string place = parameters.place("filename");
   if (name.empty())
@@ -19,20 +27,24 @@ Mesh load_mesh_of_type(Parameters& parameters, const std::string& type, Warnings
   if (!to_lower(name).ends_with("." + type))
     fail(ErrorCode::kValue, place, "'{}' is not a .{} file: {} reads no other", name, type,
          parameters.name());
+  const std::string path = resolve_path(name, parameters.plugin().file);
   try {
-    return load_mesh(resolve_path(name, parameters.plugin().file), warnings);
+    if (type != "serialized") return {load_mesh(path, warnings)};
+    const int index = parameters.integer("shapeIndex", 0, 0, std::numeric_limits<int>::max());
+    SerializedMesh read = load_serialized_mesh(path, static_cast<std::uint32_t>(index), warnings);
+    // Mitsuba counts v of a texture from its upper edge, and these are its own files.
+    for (Vec2& uv : read.mesh.uvs) uv.y = 1 - uv.y;
+    return {std::move(read.mesh), read.face_normals};
   } catch (const Error& error) {
+    if (error.place() != path) throw;
     throw Error(error.code(), place, error.what());
   }
 }
 
-// In the shape's own space; file meshes without normals get them later, in world space.
-Mesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
+Mesh make_built_in_mesh(Parameters& parameters, const std::string& type) {
   const auto to_float = [](const Vec3d& v) {
     return Vec3(static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z));
   };
-  if (type == "obj" || type == "ply" || type == "stl" || type == "off")
-    return load_mesh_of_type(parameters, type, warnings);
   if (type == "rectangle") return make_rectangle();
   if (type == "cube") return make_cube();
   if (type == "disk") return make_disk();
@@ -53,12 +65,24 @@ Mesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnin
     transform_mesh(mesh, placement, parameters.plugin().place());
     return mesh;
   }
-  fail_unknown_type(parameters.plugin(), "obj, ply, stl, off, sphere, rectangle, cube, disk, cylinder");
+  fail_unknown_type(
+      parameters.plugin(),
+      "obj, ply, stl, off, serialized, sphere, rectangle, cube, disk, cylinder, shapegroup, instance");
+}
+
+ShapeMesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
+  for (const std::string_view file_type : {"obj", "ply", "stl", "off", "serialized"})
+    if (type == file_type) return load_mesh_of_type(parameters, type, warnings);
+  return {make_built_in_mesh(parameters, type)};
 }
 
 constexpr double kMinArea = 1e-30;  // below it single precision has no face normals
 
-void check_extent(const Mesh& mesh, const std::string& place) {
+}  // namespace
+
+void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transform_place,
+                const std::string& place) {
+  transform_mesh(mesh, to_world, transform_place);
   for (const Vec3& p : mesh.positions)
     for (int k = 0; k < 3; ++k)
       if (!(std::abs(p[k]) < kMaxCoordinate))
@@ -67,14 +91,13 @@ void check_extent(const Mesh& mesh, const std::string& place) {
     fail(ErrorCode::kValue, place, "the shape has no area in world space");
 }
 
-}  // namespace
-
 Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
   Parameters parameters(element, warnings);
-  Mesh mesh = make_mesh(parameters, plugin_type(element), warnings);
+  auto [mesh, flat] = make_mesh(parameters, plugin_type(element), warnings);
   const Matrix4 to_world = parameters.transform("toWorld");
   const bool flip = parameters.boolean("flipNormals", false);
-  const bool face_normals = parameters.boolean("faceNormals", false);
+  const bool face_normals = parameters.has("faceNormals") ? parameters.boolean("faceNormals", false)
+                                                          : flat && !parameters.has("maxSmoothAngle");
   const bool has_angle = parameters.has("maxSmoothAngle");
   const float angle = parameters.number("maxSmoothAngle", 180, {0, 180});
   const int levels = parameters.integer("subdivisions", 0, 0, 6);
@@ -88,8 +111,7 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
     for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
 
   if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
-  transform_mesh(mesh, to_world, parameters.place("toWorld"));
-  check_extent(mesh, element.place());
+  place_mesh(mesh, to_world, parameters.place("toWorld"), element.place());
   if (flip) flip_normals(mesh);
   if (face_normals) {
     mesh.normals.clear();

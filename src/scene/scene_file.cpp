@@ -13,7 +13,16 @@ namespace nacre {
 namespace {
 
 constexpr std::size_t kMaxTriangles = 200'000'000;  // of all shapes together
+constexpr std::size_t kMaxShapes = 1'000'000;
 constexpr float kDefaultFov = 35;
+
+bool is_group(const XmlElement& element) {
+  return element.tag == "shape" && plugin_type(element) == "shapegroup";
+}
+
+bool is_instance(const XmlElement& element) {
+  return element.tag == "shape" && plugin_type(element) == "instance";
+}
 
 class Builder {
  public:
@@ -21,18 +30,30 @@ class Builder {
   void build();
 
  private:
+  struct Group {
+    std::vector<Shape> shapes;  // in the group's own space; read with the first instance
+    std::size_t instances = 0, placed = 0;
+  };
+
   void collect_ids(const XmlElement& element);
   void add_element(const XmlElement& element);
   void add_light(Light light);
   void add_sensor(const XmlElement& element);
   void add_shape(const XmlElement& element);
+  void add_instance(const XmlElement& element);
+  void charge(std::size_t triangles, std::size_t shapes, const std::string& place);
+  std::optional<Light> read_light_of(const XmlElement& shape, std::uint32_t index);
+  Shape read_shape(const XmlElement& element, std::size_t number, bool emits);
+  std::vector<Shape> read_group(const XmlElement& group);
+  const XmlElement& group_of(const XmlElement& instance) const;
+  void check_unused_group(const XmlElement& group);
   void add_default_camera();
   int surface_index(const XmlElement& element);
   int medium_index(const XmlElement& element);
   int texture_index(const XmlElement& element);
   Surface read_surface_of(const XmlElement& element);
   MediumElement read_medium_of(const XmlElement& element);
-  int add_default_surface(const Shape& shape);
+  int add_default_surface(const std::string& place, bool emits);
   const XmlElement& resolve(const XmlElement& ref) const;
   void warn_about_shape(const Shape& shape);
   void warn_about_textures(const Shape& shape);
@@ -44,7 +65,8 @@ class Builder {
   const XmlElement& root_;
   std::map<std::string, const XmlElement*> ids_;
   std::map<const XmlElement*, int> surfaces_, media_, textures_;  // those that are in the scene already
-  std::size_t triangles_ = 0;
+  std::map<const XmlElement*, Group> groups_;                     // those that have an instance
+  std::size_t triangles_ = 0, shapes_ = 0;                        // in memory
   bool has_integrator_ = false, has_sample_count_ = false;
 };
 
@@ -65,11 +87,15 @@ const XmlElement& Builder::resolve(const XmlElement& ref) const {
 }
 
 void Builder::build() {
+  for (const XmlElement& element : root_.children)
+    if (is_instance(element)) ++groups_[&group_of(element)].instances;
   for (const XmlElement& element : root_.children) add_element(element);
   Parameters(root_, scene_.warnings)
       .finish({"integrator", "sensor", "emitter", "shape", "bsdf", "subsurface", "texture"});
 
-  if (scene_.shapes.empty()) fail(ErrorCode::kValue, scene_.path, "the scene has no <shape>");
+  for (const XmlElement& element : root_.children)
+    if (is_group(element) && !groups_.contains(&element)) check_unused_group(element);
+  if (scene_.shapes.empty()) fail(ErrorCode::kValue, scene_.path, "the scene has no <shape> to be seen");
   // Surfaces and media enter the scene with the first shape that uses them; the others are only checked.
   for (const XmlElement& element : root_.children) {
     if (element.tag == "texture") texture_index(element);
@@ -85,7 +111,8 @@ void Builder::build() {
 
 void Builder::add_element(const XmlElement& element) {
   if (element.tag == "shape") {
-    add_shape(element);
+    if (is_instance(element)) add_instance(element);
+    if (!is_instance(element) && !is_group(element)) add_shape(element);
   } else if (element.tag == "emitter") {
     add_light(read_light(element, scene_.warnings));
   } else if (element.tag == "sensor") {
@@ -159,20 +186,51 @@ int Builder::medium_index(const XmlElement& element) {
 }
 
 // As in Mitsuba: what emits and has no bsdf reflects nothing, everything else is half grey.
-int Builder::add_default_surface(const Shape& shape) {
-  const float reflectance = shape.light == kNone ? 0.5f : 0.0f;
-  scene_.surfaces.push_back({"", shape.place, DiffuseSurface{Rgb(reflectance)}});
+int Builder::add_default_surface(const std::string& place, bool emits) {
+  scene_.surfaces.push_back({"", place, DiffuseSurface{Rgb(emits ? 0.0f : 0.5f)}});
   return static_cast<int>(scene_.surfaces.size()) - 1;
 }
 
 void Builder::add_shape(const XmlElement& element) {
   const std::size_t index = scene_.shapes.size();
+  std::optional<Light> light = read_light_of(element, static_cast<std::uint32_t>(index));
+  Shape shape = read_shape(element, index + 1, light.has_value());
+  if (light) {
+    shape.light = static_cast<int>(scene_.lights.size());
+    scene_.lights.push_back(std::move(*light));
+  }
+  charge(shape.mesh.triangles.size(), 1, element.place());
+  scene_.shapes.push_back(std::move(shape));
+}
+
+// Before meshes are copied, so that instances cannot fill the memory.
+void Builder::charge(std::size_t triangles, std::size_t shapes, const std::string& place) {
+  triangles_ += triangles;
+  shapes_ += shapes;
+  if (triangles_ > kMaxTriangles)
+    fail(ErrorCode::kLimit, place, "up to here the scene has {} triangles, more than {}", triangles_,
+         kMaxTriangles);
+  if (shapes_ > kMaxShapes)
+    fail(ErrorCode::kLimit, place, "up to here the scene has {} shapes, more than {}", shapes_, kMaxShapes);
+}
+
+std::optional<Light> Builder::read_light_of(const XmlElement& shape, std::uint32_t index) {
+  std::optional<Light> light;
+  for (const XmlElement& child : shape.children) {
+    if (child.tag != "emitter") continue;
+    if (light) fail(ErrorCode::kSyntax, child.place(), "a second <emitter> in one shape");
+    light = read_area_light(child, index, scene_.warnings);
+    if (light->id.empty()) light->id = shape.get("id");
+  }
+  return light;
+}
+
+// Without its light. `number` gives a name to one that has no id.
+Shape Builder::read_shape(const XmlElement& element, std::size_t number, bool emits) {
   Shape shape;
-  shape.id = element.has("id") ? element.get("id") : fmt::format("shape {}", index + 1);
+  shape.id = element.has("id") ? element.get("id") : fmt::format("shape {}", number);
   shape.type = plugin_type(element);
   shape.place = element.place();
-
-  std::optional<Light> light;
   for (const XmlElement& child : element.children) {
     const XmlElement& target = child.tag == "ref" ? resolve(child) : child;
     const auto set_once = [&](bool is_set) {
@@ -184,10 +242,6 @@ void Builder::add_shape(const XmlElement& element) {
     } else if (target.tag == "subsurface") {
       set_once(shape.medium != kNone);
       shape.medium = medium_index(target);
-    } else if (target.tag == "emitter" && &target == &child) {
-      set_once(light.has_value());
-      light = read_area_light(child, static_cast<std::uint32_t>(index), scene_.warnings);
-      if (light->id.empty()) light->id = element.get("id");
     } else if (child.tag == "ref") {
       fail(ErrorCode::kUnsupported, child.place(),
            "'{}' is {} <{}>; a shape can refer to a <bsdf> or a <subsurface>", child.get("id"),
@@ -195,19 +249,76 @@ void Builder::add_shape(const XmlElement& element) {
     }
   }
   shape.mesh = read_mesh(element, scene_.warnings);
-  triangles_ += shape.mesh.triangles.size();
-  if (triangles_ > kMaxTriangles)
-    fail(ErrorCode::kLimit, element.place(), "up to here the scene has {} triangles, more than {}",
-         triangles_, kMaxTriangles);
-
-  if (light) {
-    shape.light = static_cast<int>(scene_.lights.size());
-    scene_.lights.push_back(std::move(*light));
-  }
-  if (shape.surface == kNone && shape.medium == kNone) shape.surface = add_default_surface(shape);
+  if (shape.surface == kNone && shape.medium == kNone)
+    shape.surface = add_default_surface(shape.place, emits);
   warn_about_textures(shape);
   if (shape.medium != kNone) warn_about_shape(shape);
-  scene_.shapes.push_back(std::move(shape));
+  return shape;
+}
+
+// The shapes of a shapegroup in its own space.
+std::vector<Shape> Builder::read_group(const XmlElement& group) {
+  std::vector<Shape> shapes;
+  for (const XmlElement& element : group.children) {
+    if (element.tag != "shape") continue;
+    if (is_group(element) || is_instance(element))
+      fail(ErrorCode::kUnsupported, element.place(), "a shape '{}' inside a shapegroup is not supported",
+           element.get("type"));
+    for (const XmlElement& child : element.children)
+      if (child.tag == "emitter")
+        fail(ErrorCode::kUnsupported, child.place(),
+             "instancing of emitters is not supported: move the emitting shape out of the shapegroup");
+    shapes.push_back(read_shape(element, shapes.size() + 1, false));
+    charge(shapes.back().mesh.triangles.size(), 1, element.place());
+  }
+  Parameters(group, scene_.warnings).finish({"shape"});
+  if (shapes.empty()) fail(ErrorCode::kSyntax, group.place(), "a shapegroup needs a <shape> inside");
+  return shapes;
+}
+
+const XmlElement& Builder::group_of(const XmlElement& instance) const {
+  const XmlElement* group = nullptr;
+  for (const XmlElement& child : instance.children) {
+    if (child.tag != "ref") continue;
+    if (group) fail(ErrorCode::kSyntax, child.place(), "a second <ref> in one instance");
+    group = &resolve(child);
+    if (!is_group(*group))
+      fail(ErrorCode::kUnsupported, child.place(),
+           "'{}' is no shapegroup, which is what an instance refers to", child.get("id"));
+  }
+  if (!group) fail(ErrorCode::kSyntax, instance.place(), "an instance needs a <ref> to a shapegroup");
+  return *group;
+}
+
+void Builder::add_instance(const XmlElement& element) {
+  const XmlElement& group_element = group_of(element);
+  Group& group = groups_.at(&group_element);
+  if (group.placed++ == 0) {
+    group.shapes = read_group(group_element);
+    // All instances at once, before any is there.
+    std::size_t triangles = 0;
+    for (const Shape& shape : group.shapes) triangles += shape.mesh.triangles.size();
+    charge(group.instances * triangles, group.instances * group.shapes.size(), element.place());
+  }
+  Parameters parameters(element, scene_.warnings);
+  const Matrix4 to_world = parameters.transform("toWorld");
+  parameters.finish({"ref"});
+  for (const Shape& original : group.shapes) {
+    Shape shape = original;
+    shape.id = fmt::format("{}/{}#{}", group_element.get("id"), original.id, group.placed);
+    shape.place = element.place();
+    place_mesh(shape.mesh, to_world, parameters.place("toWorld"), element.place());
+    scene_.shapes.push_back(std::move(shape));
+  }
+}
+
+// Nothing of a group that is nowhere in the scene enters it; what is wrong with it is said all the same.
+void Builder::check_unused_group(const XmlElement& group) {
+  Scene scratch;
+  scratch.path = scene_.path;
+  Builder(scratch, root_).read_group(group);
+  std::ranges::move(scratch.warnings, std::back_inserter(scene_.warnings));
+  warn(group.place(), fmt::format("no instance uses the shapegroup '{}'", group.get("id")));
 }
 
 void Builder::warn_about_shape(const Shape& shape) {

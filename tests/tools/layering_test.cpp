@@ -33,6 +33,7 @@ const std::vector<Library> kLibraries{
     {"embree3/", {"src/geometry/"}},
     {"OpenMesh/", {"src/geometry/"}},
     {"pugixml", {"src/scene/"}},
+    {"zlib.h", {"src/geometry/serialized_file.cpp"}},
     {"xxhash", {"src/cache/"}},
     {"flann/", {"src/bake/"}},
     {"hwy/", {"src/"}},

@@ -213,6 +213,30 @@ TEST_F(Program, OtherCamerasAndSizes) {
   EXPECT_NE(run("render s.xml -o c.exr --camera third", 1).find("other"), std::string::npos);
 }
 
+// One run for several cameras gives what one run each would, and its stages still add up.
+TEST_F(Program, SeveralCamerasAtOnce) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o a.exr --camera main,other --png --report r.json");
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("a.exr")));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("a.main.png")));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("a.other.png")));
+  run("render s.xml --cache c.nacre -o b.exr --camera other");
+  expect_identical("a.other.exr", "b.exr");
+  run("render s.xml --cache c.nacre -o b.exr --camera main");
+  expect_identical("a.main.exr", "b.exr");
+  const auto report = nlohmann::json::parse(testing_support::read_file(folder_.file("r.json")));
+  EXPECT_EQ(report["counts"]["pixels"], 64 * 48 + 32 * 32);
+  for (const auto& [stage, seconds] : report["seconds"].items()) EXPECT_GE(seconds, 0) << stage;
+
+  run("render --camera other --camera main s.xml --cache c.nacre -o d.exr --spp 1");
+  EXPECT_EQ(image("d.main.exr").width, 64);
+  run("render s.xml --cache c.nacre -o e.exr --camera main,third", 1);
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("e.main.exr")));
+  EXPECT_NE(
+      run("render s.xml -o e.exr --camera main,main", 2).find("two pictures would be written to e.main.exr"),
+      std::string::npos);
+}
+
 TEST_F(Program, InfoOnEverything) {
   run("bake s.xml -o c.nacre");
   run("render s.xml --cache c.nacre -o a.exr");

@@ -125,23 +125,29 @@ struct Shape {
   int light = kNone;   // index into Scene::lights (an AreaLight)
 };
 
+enum class CameraKind { kPerspective, kThinLens, kOrthographic };
 enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 
 /// Mitsuba's camera space: looks along +z, +y up, +x to the left of the picture.
 struct Camera {
   std::string id, place;
+  /// Rigid, perhaps mirroring. Of kOrthographic it also scales the picture, which spans [-1, 1] in x.
   Matrix4 to_world;
-  float fov = 39.3077f;  // full angle along fov_axis, degrees
+  CameraKind kind = CameraKind::kPerspective;
+  float fov = 39.3077f;  // full angle along fov_axis, degrees; not of kOrthographic
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;
+  // kThinLens: radius of the lens, and distance along the axis at which things are sharp.
+  float aperture_radius = 0, focus_distance = 1e4f;
 };
 
-enum class FilterKind { kBox, kGaussian };
+enum class FilterKind { kBox, kTent, kGaussian, kMitchell };
 struct Film {
   int width = 768, height = 576;
   FilterKind filter = FilterKind::kGaussian;
-  float filter_radius = 2;  // pixels; half-width of the box (default 0.5) or cut-off of the gaussian
-  float filter_stddev = 0.5f;
+  float filter_radius = 2;                         // pixels; where the filter ends
+  float filter_stddev = 0.5f;                      // kGaussian
+  float filter_b = 1 / 3.0f, filter_c = 1 / 3.0f;  // kMitchell: Mitchell & Netravali 1988
 };
 
 /// What Integrator::bounces() returns for a path without limit.
