@@ -124,9 +124,9 @@ Warnings check_density(const Scene& scene, const Cache& cache) {
     const double blotch = predict_blotch(spacing / length);
     if (blotch > kAcceptableBlotch)
       warnings.push_back(
-          fmt::format("{}: the samples of medium {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
+          fmt::format("{}: the samples of {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
                       "blotches of {:.1f} %; --spacing {:.3g} would serve",
-                      medium.place, medium_name(scene, m), spacing, spacing / length, 100 * blotch,
+                      medium.place, medium_label(scene, m), spacing, spacing / length, 100 * blotch,
                       kDefaultSpacing * length));
   }
   return warnings;
@@ -167,9 +167,9 @@ Warnings check_single_scattering(const Scene& scene, const Options& options) {
   for (std::size_t m = 0; m < scene.media.size(); ++m)
     if (options.single_samples.value_or(0) > 0 && scene.media[m].profile == ProfileKind::kNormalized)
       warnings.push_back(
-          fmt::format("{}: the profile of medium {} contains single scattering: --single-samples "
+          fmt::format("{}: the profile of {} contains single scattering: --single-samples "
                       "has no effect on it",
-                      scene.media[m].place, medium_name(scene, m)));
+                      scene.media[m].place, medium_label(scene, m)));
   return warnings;
 }
 

@@ -123,12 +123,12 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     group.name = medium_name(scene, m);
     for (const Mesh* mesh : group_meshes(scene, m)) group.surface_area += surface_area(*mesh);
     if (!(group.surface_area > 0))
-      fail(ErrorCode::kValue, medium.place, "the shapes of medium {} have no surface to put samples on",
-           group.name);
+      fail(ErrorCode::kValue, medium.place, "the shapes of {} have no surface to put samples on",
+           medium_label(scene, m));
     const double length = static_cast<double>(smallest_mean_free_path(medium)) / medium.scale;  // scene units
     if (!std::isfinite(length))
-      fail(ErrorCode::kValue, medium.place,
-           "medium {} neither scatters nor absorbs; give it coefficients above 0", group.name);
+      fail(ErrorCode::kValue, medium.place, "{} neither scatters nor absorbs; give it coefficients above 0",
+           medium_label(scene, m));
     weights.push_back(group.surface_area / square(length));
     total_weight += weights.back();
     const double spacing = params.spacing_mm ? *params.spacing_mm / medium.scale : kDefaultSpacing * length;

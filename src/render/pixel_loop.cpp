@@ -48,7 +48,7 @@ PixelLoop::PixelLoop(const World& world, const Cache& cache, const RenderParams&
 }
 
 void PixelLoop::render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const {
-  std::vector<Path> paths = start_paths(begin, end);
+  std::vector<Path> paths = start_paths(begin, end, pixels);
   std::vector<Path> next;
   for (int wave = 0; wave < wave_limit_ && !paths.empty(); ++wave) {
     {
@@ -76,7 +76,8 @@ std::uint64_t PixelLoop::pixel_key(std::uint32_t pixel, std::uint64_t purpose) c
   return hash_words(params_.seed, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y), purpose);
 }
 
-std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size_t end) const {
+std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size_t end,
+                                                    PixelBuffer& pixels) const {
   std::vector<Path> paths;
   paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
   for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
@@ -88,6 +89,7 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size
       Path path;
       path.ray.ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
       path.throughput = Rgb(offset.weight);
+      pixels.weight[pixel] += offset.weight;
       path.pixel = pixel;
       path.sample = sample;
       paths.push_back(path);

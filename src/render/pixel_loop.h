@@ -43,7 +43,7 @@ class PixelLoop {
 
   std::array<int, 2> place(std::uint32_t pixel) const;
   std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
-  std::vector<Path> start_paths(std::size_t begin, std::size_t end) const;
+  std::vector<Path> start_paths(std::size_t begin, std::size_t end, PixelBuffer& pixels) const;
   void record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const;
   void add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const;
   void shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const;

@@ -17,14 +17,15 @@ struct PixelBuffer {
 
   int width, height;
   std::array<std::vector<Rgb>, kLayerCount> layers;
-  std::vector<float> coverage;  // filter weights of the samples that hit anything
+  std::vector<float> weight;    // filter weights of all samples
+  std::vector<float> coverage;  // and of those that hit anything
   std::vector<Vec3> position, normal;
   std::vector<float> depth, object_id;
 
   void add(Layer layer, std::uint32_t pixel, const Rgb& value) {
     layers[static_cast<std::size_t>(layer)][pixel] += value;
   }
-  /// Divides by the number of samples and lays out the channels that are selected.
+  /// Divides by the samples' weights and lays out the channels that are selected.
   Image make_image(const RenderParams& params) const;
 };
 

@@ -14,9 +14,9 @@ Warnings describe_lost_samples(const Scene& scene, const Totals& totals) {
   for (std::size_t m = 0; m < scene.media.size(); ++m)
     if (totals.lost[m] > 0)
       warnings.push_back(fmt::format(
-          "{}: {} of {} single-scattering rays found no way out of medium {}, as through a hole; "
+          "{}: {} of {} single-scattering rays found no way out of {}, as through a hole; "
           "its bounding box ended them: close its surface, or take the shading there as a guess",
-          scene.media[m].place, totals.lost[m].load(), totals.taken[m].load(), medium_name(scene, m)));
+          scene.media[m].place, totals.lost[m].load(), totals.taken[m].load(), medium_label(scene, m)));
   return warnings;
 }
 

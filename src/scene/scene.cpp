@@ -33,6 +33,11 @@ std::string medium_name(const Scene& scene, std::size_t medium) {
   return id.empty() ? fmt::format("medium {}", medium + 1) : id;
 }
 
+std::string medium_label(const Scene& scene, std::size_t medium) {
+  const std::string& id = scene.media[medium].id;
+  return id.empty() ? medium_name(scene, medium) : fmt::format("medium '{}'", id);
+}
+
 std::size_t find_camera(const Scene& scene, const std::string& id, const std::string& place) {
   std::string known;
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {

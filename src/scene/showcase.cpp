@@ -137,6 +137,7 @@ Scene make_showcase_scene(const std::string& mesh_path, const Medium& medium, do
   scene.shapes.push_back(std::move(object));
   scene.media.push_back(medium);
   scene.media[0].scale = 1;
+  scene.media[0].place = mesh_path;
   scene.subsurface.emplace_back();
 
   // The key comes from behind, where thin parts let it through; the fill opens the shadows from the front.

@@ -54,8 +54,7 @@ Warnings check_validity(const Scene& scene) {
           "`scale`",
           reasons.empty() ? "" : "; ", extent.thickness_mm, extent.thickness_mm / longest, kLeastThickness);
     if (!reasons.empty())
-      warnings.push_back(
-          fmt::format("{}: medium {} ({}): {}", medium.place, medium_name(scene, m), size, reasons));
+      warnings.push_back(fmt::format("{}: {} ({}): {}", medium.place, medium_label(scene, m), size, reasons));
   }
   return warnings;
 }

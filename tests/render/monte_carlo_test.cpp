@@ -111,23 +111,24 @@ TEST(Plane, MeanIsTheTotalOfTheProfile) {
 // it: blocks of both pictures differ by no more than the noise that the Monte Carlo's own pixels show.
 struct Subject {
   const char* name;
+  float window;  // that the camera sees
   void (*build)(Scene&);
 };
 const Subject kSubjects[] = {
-    {"slab",
+    {"slab", 10,
      [](Scene& scene) {
        add_shape(scene, placed(make_cube(), Vec3(6, 6, 1.2f), {0, 0, 0}), kNone, 0);
        add_area_light(scene, placed(make_rectangle(), 2, {3, 1, -9}), {20, 25, 30});  // faces up
        add_point_light(scene, {-9, 4, 7}, {60, 50, 40});
      }},
-    {"bumps", [](Scene& scene) {
+    {"bumps", 5, [](Scene& scene) {
        Mesh mesh = make_sphere();
        for (Vec3& p : mesh.positions)
-         p *= 5 * (1 + 0.15f * std::sin(5 * p.x) * std::sin(4 * p.y + 1) * std::sin(6 * p.z));
+         p *= 2.5f * (1 + 0.15f * std::sin(5 * p.x) * std::sin(4 * p.y + 1) * std::sin(6 * p.z));
        mesh.normals.clear();
        add_shape(scene, std::move(mesh), kNone, 0);
-       add_shape(scene, placed(make_sphere(), 1, {3, 3, 6}));  // casts the shadow
-       add_area_light(scene, flipped(placed(make_rectangle(), 2, {5, 5, 12})), {20, 25, 30});
+       add_shape(scene, placed(make_sphere(), 0.5f, {1.5f, 1.5f, 3}));  // casts the shadow
+       add_area_light(scene, flipped(placed(make_rectangle(), 1, {2.5f, 2.5f, 6})), {20, 25, 30});
        add_directional_light(scene, {1, 0.3f, 0.4f}, {2, 2, 2});
      }}};
 
@@ -137,7 +138,7 @@ TEST(Blocks, AgreeWithTheHierarchicalSumWithinTheirNoise) {
     Scene scene;
     add_medium(scene, make_test_medium());
     subject.build(scene);
-    add_camera(scene, {0, 0, 60}, 10, kPixels);
+    add_camera(scene, {0, 0, 60}, subject.window, kPixels);
     const World world = make_world(scene, true);
     const Cache cache = bake_exactly(world);
     RenderParams params = default_render_params(scene, 0);

@@ -185,6 +185,8 @@ int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int
 /// Name for messages: id or "light 2".
 std::string light_name(const Scene& scene, std::size_t light);
 std::string medium_name(const Scene& scene, std::size_t medium);
+/// The same as part of a sentence: "medium 'wax'" or "medium 2".
+std::string medium_label(const Scene& scene, std::size_t medium);
 /// Index of the camera with that id. Throws Error(kValue, place) that lists the ids there are.
 std::size_t find_camera(const Scene& scene, const std::string& id, const std::string& place);
 
