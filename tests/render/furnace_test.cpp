@@ -123,6 +123,24 @@ TEST(Furnace, TranslucentPlaneReflectsItsTotal) {
     }
 }
 
+// The same in light from all around, by an integrator of one bounce and one of many.
+TEST(Furnace, TranslucentPlaneUnderAnEvenSky) {
+  for (const IntegratorKind kind : {IntegratorKind::kDirect, IntegratorKind::kPath}) {
+    Scene scene = make_translucent_plane(30, ProfileKind::kDipole, Convention::kConserving);
+    std::erase_if(scene.shapes, [](const Shape& shape) { return shape.light != kNone; });
+    scene.lights = {{"sky", "", ConstantLight{{1, 1, 1}}}};
+    scene.integrator.kind = kind;
+    scene.subsurface[0].indirect = true;
+    const Means means = render_means(scene, 256, 0.2);
+    const auto profiles = make_profiles(scene.media[0]);
+    const double f_r = fresnel_reflectance(std::cos(30 * kPiD / 180), 1.4);
+    for (int k = 0; k < 3; ++k) {
+      const double expected = f_r + (1 - f_r) * profiles[static_cast<std::size_t>(k)].total;
+      EXPECT_NEAR(means.beauty[k] / expected, 1, 0.005) << static_cast<int>(kind) << k;
+    }
+  }
+}
+
 TEST(Furnace, PublishedConventionLosesTheTransmittance) {
   const Means published =
       render_means(make_translucent_plane(5, ProfileKind::kDipole, Convention::kPublished), 64, 0.3);

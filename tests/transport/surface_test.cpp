@@ -137,5 +137,33 @@ TEST(SurfaceAt, MirrorsHaveNoDarkRims) {
   }
 }
 
+// The normal that is seen is the interpolated one, and where that would mirror the eye into the surface, the
+// nearest that does not; it never turns away, so that no silhouette goes black.
+TEST(NormalTowards, IsSeenAndMirrorsAboveThePlane) {
+  int bent = 0;
+  for (std::uint32_t n = 0; n < 20000; ++n) {
+    SurfacePoint point{{0, 0, 0}, {0, 0, 1}, 1, sample_uniform_sphere(sobol_2d(n, 1))};
+    if (point.shading_normal.z < 0) point.shading_normal = -point.shading_normal;
+    const Vec3 out = sample_uniform_sphere(sobol_2d(n, 2));
+    if (std::abs(out.z) < 1e-3f) continue;
+    const float side = out.z > 0 ? 1.0f : -1.0f;
+    const Vec3 normal = point.normal_towards(out);
+    ASSERT_NEAR(normal.length(), 1, 1e-5);
+    ASSERT_GT(dot(normal, out), 0);
+    const Vec3 image = normal * (2 * dot(normal, out)) - out;
+    ASSERT_GT(image.z * side, 0);
+    const Vec3 interpolated = point.shading_normal * side;
+    const Vec3 mirrored = interpolated * (2 * dot(interpolated, out)) - out;
+    if (mirrored.z * side > 2e-3f) {
+      ASSERT_EQ(normal, interpolated);
+    } else {
+      ++bent;
+      // At least as steep as half the angle of the plane.
+      ASSERT_GE(dot(normal, out), 0.99f * std::sin(std::asin(std::abs(out.z)) / 2));
+    }
+  }
+  EXPECT_GT(bent, 2000);
+}
+
 }  // namespace
 }  // namespace nacre
