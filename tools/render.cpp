@@ -20,7 +20,7 @@ struct Options {
   std::string output, cache, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
   std::vector<std::string> cameras;
   int samples_per_pixel = 0;
-  double tolerance = 0.01;
+  std::optional<double> tolerance;
   std::optional<int> single_samples, mc_samples;
   std::optional<std::string> mc_sampling;
   bool png = false;
@@ -89,7 +89,7 @@ RenderParams make_params(const Options& options, const Scene& scene, const std::
   if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
   params.method =
       static_cast<Method>(std::find(kMethods.begin(), kMethods.end(), options.method) - kMethods.begin());
-  params.tolerance = options.tolerance;
+  if (options.tolerance) params.tolerance = *options.tolerance;
   if (options.single_samples) params.single_samples = *options.single_samples;
   if (options.mc_samples) params.mc_samples = *options.mc_samples;
   if (options.mc_sampling == "uniform") params.mc_sampling = MonteCarloSampling::kUniform;
@@ -152,24 +152,31 @@ void check_combination(const Options& options, bool cached) {
                              options.bake.interreflect;
   if (!cached && (!options.cache.empty() || samples_cache))
     throw UsageError(
-        fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing and "
-                    "--irradiance-samples",
+        fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing, "
+                    "--irradiance-samples and --interreflect",
                     options.method));
   if ((options.mc_samples || options.mc_sampling) && options.method != "montecarlo")
     throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
-  if (options.single_samples && options.method == "lambert")
+  if (options.tolerance && options.method != "hierarchical")
+    throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
+  if (options.single_samples.value_or(0) > 0 && options.method == "lambert")
     throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
 }
 
-// Media that hold all orders of scattering already, where single scattering was asked for.
+// Media in which no light is traced that scatters once, where that was asked for.
 Warnings check_single_scattering(const Scene& scene, const Options& options) {
   Warnings warnings;
-  for (std::size_t m = 0; m < scene.media.size(); ++m)
-    if (options.single_samples.value_or(0) > 0 && scene.media[m].profile == ProfileKind::kNormalized)
-      warnings.push_back(
-          fmt::format("{}: the profile of {} contains single scattering: --single-samples "
-                      "has no effect on it",
-                      scene.media[m].place, medium_label(scene, m)));
+  if (options.single_samples.value_or(0) == 0) return warnings;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    const char* const reason = medium.lambert ? "is taken for an opaque surface (lambert)"
+                               : medium.profile == ProfileKind::kNormalized
+                                   ? "has a profile that contains single scattering"
+                                   : nullptr;
+    if (reason)
+      warnings.push_back(fmt::format("{}: {} {}: --single-samples has no effect on it", medium.place,
+                                     medium_label(scene, m), reason));
+  }
   return warnings;
 }
 

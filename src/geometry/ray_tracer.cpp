@@ -4,6 +4,7 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "nacre/base/error.h"
 
@@ -80,7 +81,7 @@ RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::u
   impl_->scene.reset(rtcNewScene(device));
   const RTCScene scene = impl_->scene.get();
   check(device);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   for (std::uint32_t i = 0; i < meshes.size(); ++i) {
     if (meshes[i]->triangles.empty()) continue;
@@ -117,6 +118,52 @@ bool RayTracer::occluded(const Ray& ray, std::uint32_t mask) const noexcept {
   fill(query, ray, mask);
   rtcOccluded1(impl_->scene.get(), &context, &query);
   return query.tfar < 0;  // Embree's mark
+}
+
+namespace {
+
+constexpr std::size_t kMostHits = 4096;
+
+// What the filter of RayTracer::collect sees; the base has to come first.
+struct Collector {
+  RTCIntersectContext context;
+  const std::uint8_t* passable;
+  std::vector<Hit>* hits;
+};
+
+// Takes note of a hit and lets the ray go on, or ends it.
+void collect_hit(const RTCFilterFunctionNArguments* arguments) {
+  auto& collector = *reinterpret_cast<Collector*>(arguments->context);
+  const auto& ray = *reinterpret_cast<const RTCRay*>(arguments->ray);
+  const auto& hit = *reinterpret_cast<const RTCHit*>(arguments->hit);
+  if (!collector.passable[hit.geomID] || collector.hits->size() >= kMostHits) return;
+  collector.hits->push_back({ray.tfar, hit.geomID, hit.primID, hit.u, hit.v});
+  arguments->valid[0] = 0;
+}
+
+}  // namespace
+
+bool RayTracer::collect(const Ray& ray, std::span<const std::uint8_t> passable,
+                        std::vector<Hit>& hits) const {
+  hits.clear();
+  if (!has_interval(ray)) return true;
+  hits.reserve(16);
+  Collector collector{{}, passable.data(), &hits};
+  rtcInitIntersectContext(&collector.context);
+  collector.context.filter = collect_hit;
+  RTCRay query;
+  fill(query, ray, ~0u);
+  rtcOccluded1(impl_->scene.get(), &collector.context, &query);
+  if (query.tfar < 0) return false;
+  std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
+    return std::tie(a.t, a.mesh, a.triangle) < std::tie(b.t, b.mesh, b.triangle);
+  });
+  // Triangles that the hierarchy has split are met once in each part.
+  hits.erase(
+      std::unique(hits.begin(), hits.end(),
+                  [](const Hit& a, const Hit& b) { return a.mesh == b.mesh && a.triangle == b.triangle; }),
+      hits.end());
+  return true;
 }
 
 Box3 RayTracer::bounds() const noexcept { return impl_->box; }

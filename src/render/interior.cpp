@@ -9,8 +9,6 @@
 namespace nacre {
 namespace {
 
-// Boundaries on one way, over which nothing measurable is left.
-constexpr std::size_t kMostCrossings = 256;
 // How much of the distance to a light counts, so that the light's own surface does not.
 constexpr float kReach = 1 - 1e-4f;
 
@@ -35,11 +33,21 @@ float distance_to_plane(const Vec3& position, const Vec3& direction, const Surfa
   return std::isfinite(t) ? std::max(t, 0.0f) : 0.0f;
 }
 
+// Whether two triangles of one mesh meet at a vertex.
+bool share_vertex(const World& world, const Hit& a, const Hit& b) {
+  if (a.mesh != b.mesh) return false;
+  const Mesh& mesh = world.shape(a).mesh;
+  for (const std::uint32_t i : mesh.triangles[a.triangle])
+    for (const std::uint32_t j : mesh.triangles[b.triangle])
+      if (mesh.positions[i] == mesh.positions[j]) return true;
+  return false;
+}
+
 }  // namespace
 
 InteriorPoint ViewSegment::at(float distance) const {
   InteriorPoint point{begin + direction * distance,
-                      first_origin + (last_origin - first_origin) * (distance / length)};
+                      first_origin + (last_origin - first_origin) * (distance / length), depth};
   for (const Crossing& crossing : crossings)
     if (crossing.t < distance) point.depth += crossing.leaving ? -1 : 1;
   point.depth = std::max(point.depth, 1);
@@ -48,8 +56,61 @@ InteriorPoint ViewSegment::at(float distance) const {
 
 Interior::Interior(const World& world, std::size_t medium)
     : world_(world), medium_(static_cast<int>(medium)), eta_(world.scene->media[medium].eta()) {
-  for (const Shape& shape : world.scene->shapes)
-    if (shape.medium == medium_) box_.extendBy(bounds(shape.mesh));
+  int bodies = 0;
+  for (const Shape& shape : world.scene->shapes) {
+    const bool own = shape.medium == medium_;
+    if (own) box_.extendBy(bounds(shape.mesh));
+    bodies += own;
+    const Bsdf& bsdf = world.bsdfs[passable_.size()];
+    passable_.push_back(own || !world.shadows || (bsdf.transmits && !bsdf.rough()));
+  }
+  all_.assign(passable_.size(), 1);
+  several_bodies_ = bodies > 1;
+  // A flat sheet stands for a half-space.
+  if (box_.isEmpty()) return;
+  const Vec3 size = box_.size();
+  for (int k = 0; k < 3; ++k)
+    if (size[k] < 1e-6f * size.length()) {
+      box_.min[k] -= size.length();
+      box_.max[k] += size.length();
+    }
+}
+
+// How many bodies begin at a point of the surface, which more than one do where faces lie upon each other.
+int Interior::bodies_below(const SurfacePoint& at, float side) const {
+  if (!several_bodies_) return 1;
+  const Vec3 above = at.origin(side), below = at.origin(-side);
+  std::vector<Hit> hits;
+  std::vector<Crossing> crossings;
+  if (!world_.tracer.collect({above, below - above, 0, 1}, all_, hits)) return 1;
+  find_crossings(above, (below - above).normalized(), hits, crossings);
+  int depth = 0;
+  for (const Crossing& crossing : crossings)
+    if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
+  return std::max(depth, 1);
+}
+
+// Hits as crossings: distances from the true point, one for a ray through the edge of two faces, and where
+// bodies touch the next one entered before the last is left.
+void Interior::find_crossings(const Vec3& from, const Vec3& direction, const std::vector<Hit>& hits,
+                              std::vector<Crossing>& crossings) const {
+  crossings.clear();
+  float last_reach = 0;  // within which distances are the same, for all that precision tells
+  for (const Hit& hit : hits) {
+    const SurfacePoint point = surface_point(world_, hit);
+    const float side = point.side(direction);
+    const float cosine = std::max(std::abs(dot(point.geometric_normal, direction)), 1e-3f);
+    const float reach = (point.origin(side) - point.position).length() / cosine;
+    const Crossing crossing{distance_to_plane(from, direction, point), hit, side > 0};
+    const bool touches = !crossings.empty() && crossing.t - crossings.back().t <= std::max(reach, last_reach);
+    last_reach = reach;
+    if (touches && crossing.leaving == crossings.back().leaving &&
+        share_vertex(world_, hit, crossings.back().hit))
+      continue;
+    crossings.push_back(crossing);
+    if (touches && !crossing.leaving && crossings[crossings.size() - 2].leaving)
+      std::swap(crossings.back(), crossings[crossings.size() - 2]);
+  }
 }
 
 ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const {
@@ -57,76 +118,58 @@ ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, cons
   segment.begin = from.position;
   segment.direction = direction;
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
-  Ray ray{segment.first_origin, direction};
-  int depth = 1;
-  for (std::size_t n = 0; n < kMostCrossings; ++n) {
-    const Hit hit = world_.tracer.intersect(ray);
-    if (!hit) {
-      Vec3 normal;
-      segment.lost = true;
-      segment.length = exit_box(box_, from.position, direction, normal);
-      segment.last_origin = from.position + direction * segment.length;
-      break;
+  segment.depth = bodies_below(from, from.side(out));
+  std::vector<Hit> hits;
+  std::vector<Crossing> crossings;
+  if (!world_.tracer.collect({segment.first_origin, direction}, all_, hits)) return segment;
+  find_crossings(from.position, direction, hits, crossings);
+  int depth = segment.depth;
+  for (const Crossing& crossing : crossings) {
+    depth += crossing.leaving ? -1 : 1;
+    if (world_.shape(crossing.hit).medium == medium_ && depth > 0) {
+      segment.crossings.push_back(crossing);
+      continue;
     }
-    const SurfacePoint point = surface_point(world_, hit);
-    const float side = point.side(direction);
-    const float t = distance_to_plane(from.position, direction, point);
-    const bool foreign = world_.shape(hit).medium != medium_;
-    depth += side > 0 ? -1 : 1;
-    if (foreign || depth == 0) {
-      // Between surfaces closer than the offsets from them there is no inside to speak of.
-      segment.last_origin = point.origin(-side);
-      segment.length = dot(segment.last_origin - segment.first_origin, direction) > 0 ? t : 0.0f;
-      break;
-    }
-    segment.crossings.push_back({t, hit, side > 0});
-    ray.origin = point.origin(side);
+    // Between surfaces closer than the offsets from them there is no inside to speak of.
+    segment.last_origin = surface_point(world_, crossing.hit).origin(crossing.leaving ? -1.0f : 1.0f);
+    segment.length = dot(segment.last_origin - segment.first_origin, direction) > 0 ? crossing.t : 0.0f;
+    return segment;
   }
+  Vec3 normal;
+  segment.lost = true;
+  segment.length = exit_box(box_, from.position, direction, normal);
+  segment.last_origin = from.position + direction * segment.length;
   return segment;
 }
 
 LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample& sample,
-                                   std::vector<Crossing>& crossings) const {
+                                   InteriorRoom& room) const {
   LightSegment segment;
   segment.direction = sample.direction;
-  crossings.clear();
   const bool infinite = std::isinf(sample.distance);
-  Ray ray{point.origin, sample.direction};
-  Rgb glass(1, 1, 1);
-  for (std::size_t steps = 0;; ++steps) {
-    if (!infinite) {
-      ray.direction = sample.point - ray.origin;
-      ray.t_max = kReach;
-    }
-    const Hit hit = world_.tracer.intersect(ray);
-    if (!hit) break;
-    const SurfacePoint at = surface_point(world_, hit);
-    const float side = at.side(sample.direction);
-    const bool foreign = world_.shape(hit).medium != medium_;
-    if (foreign && world_.shadows) glass *= pass_glass(world_, hit, sample.direction);
-    segment.blocked = is_black(glass) || steps == kMostCrossings;
-    if (segment.blocked) return segment;
-    if (!foreign)
-      crossings.push_back({distance_to_plane(point.position, sample.direction, at), hit, side > 0});
-    const Vec3 origin = at.origin(side);
-    if (!(dot(origin - ray.origin, sample.direction) > 0)) break;  // as far as precision goes
-    ray.origin = origin;
-  }
+  const Ray ray = infinite ? Ray{point.origin, sample.direction}
+                           : Ray{point.origin, sample.point - point.origin, 0, kReach};
+  segment.blocked = !world_.tracer.collect(ray, passable_, room.hits);
+  if (segment.blocked) return segment;
+  std::erase_if(room.hits, [&](const Hit& hit) {
+    if (world_.shape(hit).medium == medium_) return false;
+    if (world_.shadows) segment.transmittance *= pass_glass(world_, hit, sample.direction);
+    return true;
+  });
+  if (is_black(segment.transmittance)) return segment;
+  find_crossings(point.position, sample.direction, room.hits, room.crossings);
 
-  segment.transmittance = glass;
+  LightSegment guess = segment;
   float open_since = 0;
-  if (sum_spans(crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
+  if (sum_spans(room.crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
     return segment;
   if (!infinite && box_.intersects(sample.point)) {  // the light is inside
     segment.length += sample.distance - open_since;
     return segment;
   }
   // There is a hole: the way out was missed, and what looked like an overlap was the next bulge.
-  LightSegment guess;
-  guess.direction = sample.direction;
   guess.lost = true;
-  guess.transmittance = glass;
-  if (!sum_spans(crossings, point.depth, Overlap::kIgnored, sample.direction, guess, open_since))
+  if (!sum_spans(room.crossings, point.depth, Overlap::kIgnored, sample.direction, guess, open_since))
     end_at_box(point.position, sample.direction, open_since, guess);
   return guess;
 }

@@ -8,11 +8,11 @@
 
 namespace nacre {
 
-/// A boundary of the medium on a straight way.
+/// A boundary on a straight way.
 struct Crossing {
   float t;  // distance from where the way starts
   Hit hit;
-  bool leaving;  // out of the medium
+  bool leaving;  // out of the body
 };
 
 /// A point inside: where it is, and where rays from it start, which is off all surfaces by more than rounding
@@ -29,6 +29,7 @@ struct ViewSegment {
   Vec3 first_origin, last_origin;  // its ends, off the surfaces
   float length = 0;
   bool lost = false;                // no surface ended it; the bounding box did
+  int depth = 1;                    // number of bodies at its beginning
   std::vector<Crossing> crossings;  // boundaries between bodies of the same medium that overlap
 
   InteriorPoint at(float distance) const;
@@ -44,6 +45,12 @@ struct LightSegment {
   float cos_entry = 1, cos_refracted = 1;  // there, outside and inside
 };
 
+/// Memory that is used again from one way to the next.
+struct InteriorRoom {
+  std::vector<Hit> hits;
+  std::vector<Crossing> crossings;
+};
+
 /// The bodies of one medium: where rays enter and leave them. A way through it is straight from the light to
 /// the point; refraction shortens each piece of it by the ratio of the cosines where the light enters
 /// (Jensen et al. 2001, section 4.1), and each boundary on it, also of another bulge of the same object,
@@ -54,11 +61,13 @@ class Interior {
 
   /// From a point of the surface, seen from the side of `out`, along the unit vector `direction` inwards.
   ViewSegment trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const;
-  /// From a point to a light sample taken there. `crossings` is room to work in.
-  LightSegment trace_light(const InteriorPoint& point, const LightSample& sample,
-                           std::vector<Crossing>& crossings) const;
+  /// From a point to a light sample taken there. `room` is memory to work in.
+  LightSegment trace_light(const InteriorPoint& point, const LightSample& sample, InteriorRoom& room) const;
 
  private:
+  int bodies_below(const SurfacePoint& at, float side) const;
+  void find_crossings(const Vec3& from, const Vec3& direction, const std::vector<Hit>& hits,
+                      std::vector<Crossing>& crossings) const;
   enum class Overlap { kCounted, kIgnored };
   bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
                  LightSegment& segment, float& open_since) const;
@@ -70,6 +79,8 @@ class Interior {
   int medium_;
   float eta_;
   Box3 box_;
+  bool several_bodies_ = false;
+  std::vector<std::uint8_t> passable_, all_;  // by mesh: what light may pass, and everything
 };
 
 }  // namespace nacre

@@ -9,10 +9,13 @@ namespace {
 
 constexpr std::size_t kPathsPerTask = 1 << 15;
 
+// Rays that are lost in closed objects, too: they met an edge or a vertex to the last bit.
+constexpr double kLostShare = 1e-6;
+
 Warnings describe_lost_samples(const Scene& scene, const Totals& totals) {
   Warnings warnings;
   for (std::size_t m = 0; m < scene.media.size(); ++m)
-    if (totals.lost[m] > 0)
+    if (static_cast<double>(totals.lost[m]) > kLostShare * static_cast<double>(totals.taken[m]))
       warnings.push_back(fmt::format(
           "{}: {} of {} single-scattering rays found no way out of {}, as through a hole; "
           "its bounding box ended them: close its surface, or take the shading there as a guess",

@@ -94,10 +94,10 @@ struct SingleScattering::Impl {
 
   // What reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the phase
   // function.
-  Rgb connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample,
-              std::vector<Crossing>& crossings, LostSamples& lost) const {
+  Rgb connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample, InteriorRoom& room,
+              LostSamples& lost) const {
     if (is_black(sample.irradiance)) return {0, 0, 0};
-    const LightSegment segment = interior.trace_light(at, sample, crossings);
+    const LightSegment segment = interior.trace_light(at, sample, room);
     ++lost.taken;
     lost.lost += segment.lost;
     if (segment.blocked || is_black(segment.transmittance)) return {0, 0, 0};
@@ -135,7 +135,7 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
   const FreeFlight flight(m.sigma_t, view.length);
   if (!flight.possible()) return sum;
 
-  std::vector<Crossing> crossings;
+  InteriorRoom room;
   for (int i = 0; i < samples; ++i) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
     const Vec3 u = sobol_3d(index, key);
@@ -143,7 +143,7 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
     const InteriorPoint at = view.at(distance);
     Rgb arriving(0, 0, 0);
     const auto gather = [&](const Connection& connection) {
-      arriving += m.connect(at, inward, connection.sample, crossings, lost);
+      arriving += m.connect(at, inward, connection.sample, room, lost);
     };
     const std::size_t lights = m.world.scene->lights.size();
     if (lights > kMaxConnectedLights)

@@ -38,7 +38,7 @@ double solid_angle(const SphericalTriangle& c) {
   // Counter-clockwise seen from the front is clockwise as directions from there.
   const double volume = -c[0].dot(c[1].cross(c[2]));
   const double angle = 2 * std::atan2(volume, 1 + c[0].dot(c[1]) + c[1].dot(c[2]) + c[2].dot(c[0]));
-  return volume > 0 && angle > 0 ? angle : 0;
+  return volume > 0 && angle > 0 ? angle : 0.0;
 }
 
 // Running sums of the triangles' solid angles.
@@ -55,21 +55,18 @@ bool measure_spans(const Mesh& mesh, const Vec3& x, Spans& spans) {
   return spans.total > kLeastSolidAngle;
 }
 
-// Angle at corner a between the great circles to b and c.
-double corner_angle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-  const Vec3d ab = a.cross(b), ac = a.cross(c);
-  return std::atan2(ab.cross(ac).length(), ab.dot(ac));
-}
-
-Vec3d sample_direction(const SphericalTriangle& corners, double u, double v) {
+// Uniform by solid angle, of which the triangle has `angle`; u chooses the part of it up to an arc from b.
+Vec3d sample_direction(const SphericalTriangle& corners, double angle, double u, double v) {
   const auto& [a, b, c] = corners;
-  const double alpha = corner_angle(a, b, c), beta = corner_angle(b, c, a), gamma = corner_angle(c, a, b);
-  const double part = u * (alpha + beta + gamma - kPiD);
-  const double s = std::sin(part - alpha), t = std::cos(part - alpha);
-  const double p = t - std::cos(alpha), q = s + std::sin(alpha) * a.dot(b);
-  const double divisor = (q * s + p * t) * std::sin(alpha);
-  const double cosine =
-      divisor != 0 ? std::clamp(((q * t - p * s) * std::cos(alpha) - q) / divisor, -1.0, 1.0) : 1.0;
+  // The angle at a, between the great circles to b and c.
+  const Vec3d ab = a.cross(b), ac = a.cross(c);
+  const double scale = 1 / std::sqrt(ab.length2() * ac.length2());
+  const double cos_a = ab.dot(ac) * scale, sin_a = ab.cross(ac).length() * scale;
+  const double sin_part = std::sin(u * angle), cos_part = std::cos(u * angle);
+  const double s = sin_part * cos_a - cos_part * sin_a, t = cos_part * cos_a + sin_part * sin_a;
+  const double p = t - cos_a, q = s + sin_a * a.dot(b);
+  const double divisor = (q * s + p * t) * sin_a;
+  const double cosine = divisor != 0 ? std::clamp(((q * t - p * s) * cos_a - q) / divisor, -1.0, 1.0) : 1.0;
   const Vec3d towards_c = (c - a * a.dot(c)).normalized();
   const Vec3d edge = a * cosine + towards_c * std::sqrt(1 - cosine * cosine);
   const double z = 1 - v * (1 - edge.dot(b));
@@ -103,9 +100,10 @@ AreaSample sample_area_light(const Mesh& mesh, const Distribution& areas, const 
     std::size_t triangle = 0;
     while (spans.cumulative[triangle] <= choice * spans.total) ++triangle;
     const double before = triangle == 0 ? 0 : spans.cumulative[triangle - 1];
-    const double within = (choice * spans.total - before) / (spans.cumulative[triangle] - before);
+    const double angle = spans.cumulative[triangle] - before;
     const Vec3d direction =
-        sample_direction(project(mesh, triangle, x), std::min(within, 1.0), static_cast<double>(u.y));
+        sample_direction(project(mesh, triangle, x), angle,
+                         std::min((choice * spans.total - before) / angle, 1.0), static_cast<double>(u.y));
     return {meet(mesh, triangle, x, direction), static_cast<float>(1 / spans.total)};
   }
   const std::size_t triangle = areas.sample(choice);

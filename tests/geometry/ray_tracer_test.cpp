@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 
 #include "nacre/base/parallel.h"
@@ -263,6 +264,36 @@ TEST(RayTracer, ThreadsAgree) {
     ASSERT_EQ(alone.t, together[i].t);
     ASSERT_EQ(alone.triangle, together[i].triangle);
   }
+}
+
+TEST(Collect, FindsEveryTriangleOnceInOrder) {
+  // Sheets at random heights, some of them at the same one, each of two meshes.
+  Mesh sheets[2];
+  std::vector<std::pair<float, std::uint32_t>> expected;
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    const float z = static_cast<float>(hash_words(i / 2) % 1000) / 10;
+    Mesh& mesh = sheets[i % 3 == 0];
+    const auto base = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), {{-9, -9, z}, {9, -9, z}, {0, 9, z}});
+    mesh.triangles.push_back({base, base + 1, base + 2});
+    expected.emplace_back(z, i % 3 == 0);
+  }
+  std::ranges::sort(expected);
+  const Mesh* meshes[] = {&sheets[0], &sheets[1]};
+  const RayTracer tracer(meshes);
+  const std::uint8_t all[] = {1, 1}, first[] = {1, 0};
+  std::vector<Hit> hits;
+  ASSERT_TRUE(tracer.collect({{0.1f, 0.2f, -1}, {0, 0, 1}}, all, hits));
+  ASSERT_EQ(hits.size(), expected.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) EXPECT_NEAR(hits[i].t - 1, expected[i].first, 1e-4);
+  EXPECT_TRUE(std::ranges::is_sorted(hits, {}, &Hit::t));
+  ASSERT_TRUE(tracer.collect({{0.1f, 0.2f, -1}, {0, 0, 1}, 0, 51}, all, hits));
+  EXPECT_LT(hits.size(), expected.size());
+  EXPECT_FALSE(tracer.collect({{0.1f, 0.2f, -1}, {0, 0, 1}}, first, hits));
+  EXPECT_TRUE(tracer.collect({{50, 0.2f, -1}, {0, 0, 1}}, first, hits));
+  EXPECT_TRUE(hits.empty());
+  // Ordinary rays are none the wiser.
+  EXPECT_NEAR(tracer.intersect({{0.1f, 0.2f, -1}, {0, 0, 1}}).t - 1, expected[0].first, 1e-4);
 }
 
 }  // namespace

@@ -108,7 +108,8 @@ TEST_F(Program, OptionsWithNothingToActOnAreRefused) {
   run("bake s.xml -o s.cache");
   for (const char* options :
        {"--method montecarlo --cache s.cache", "--method lambert --spacing 1", "--mc-samples 4",
-        "--mc-sampling uniform", "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
+        "--mc-sampling uniform", "--method exact --tolerance 0.1", "--method montecarlo --interreflect",
+        "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
     EXPECT_EQ(run_nacre(folder_, std::string("render s.xml -o x.exr ") + options).exit_code, 2) << options;
   EXPECT_FALSE(std::filesystem::exists(folder_.file("x.exr")));
 }
@@ -128,8 +129,7 @@ TEST_F(Program, InterreflectionBindsTheCacheToItsMaterials) {
   run("bake s.xml --interreflect -o bound.cache");
   run("render s.xml --cache free.cache -D sigma_a=0.2 -o a.exr");
   run("render s.xml --cache bound.cache -o b.exr");
-  const auto refused =
-      run_nacre(folder_, "render s.xml --cache bound.cache -D sigma_a=0.2 -o x.exr");
+  const auto refused = run_nacre(folder_, "render s.xml --cache bound.cache -D sigma_a=0.2 -o x.exr");
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.output.find("coefficients"), std::string::npos) << refused.output;
 }

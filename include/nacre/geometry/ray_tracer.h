@@ -42,6 +42,10 @@ class RayTracer {
   Hit intersect(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
   /// Whether anything lies between t_min and t_max.
   bool occluded(const Ray& ray, std::uint32_t mask = ~0u) const noexcept;
+  /// All hits between t_min and t_max by distance, one for each triangle; false as soon as a mesh is met
+  /// whose entry in `passable` (one for each mesh) is 0, or if there are more than 4096, and then `hits` is
+  /// of no use.
+  bool collect(const Ray& ray, std::span<const std::uint8_t> passable, std::vector<Hit>& hits) const;
   /// Box around everything; empty when there is nothing.
   Box3 bounds() const noexcept;
 
