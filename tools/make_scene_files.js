@@ -92,10 +92,10 @@ function write_studio(width, height) {
   fs.writeFileSync(path.join(scenes, "studio.hdr"), Buffer.concat([Buffer.from(header), Buffer.from(out)]));
 }
 
-// ---- Turned shapes. A profile is a polyline of [radius, height, rounding] around the y-axis, with the inside
-// ---- to its left; rounded corners and straight lines between them have exact normals.
+// ---- Turned shapes. A profile is a polyline of [radius, height, rounding, facets of the rounding] around the y-axis,
+// ---- with the inside to its left; rounded corners and straight lines between them have exact normals.
 
-function points_of(profile, arc_steps = 8) {
+function points_of(profile) {
   const points = [];  // [r, y, normal r, normal y]
   const unit = (a, b) => {
     const d = [b[0] - a[0], b[1] - a[1]], length = Math.hypot(...d);
@@ -110,7 +110,7 @@ function points_of(profile, arc_steps = 8) {
       return;
     }
     const turn = Math.atan2(before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1]);
-    const radius = corner[2], reach = radius * Math.tan(Math.abs(turn) / 2), side = Math.sign(turn);
+    const radius = corner[2], arc_steps = corner[3] || 8, reach = radius * Math.tan(Math.abs(turn) / 2), side = Math.sign(turn);
     const start = [corner[0] - before[0] * reach, corner[1] - before[1] * reach];
     const centre = [start[0] - before[1] * radius * side, start[1] + before[0] * radius * side];
     for (let k = 0; k <= arc_steps; ++k) {
@@ -165,7 +165,7 @@ write_turned("milk.obj", "What fills tumbler.obj, closed, mm",
   points_of([[0, tumbler.bottom], [wetted(tumbler.bottom), tumbler.bottom, 2.5], [wetted(tumbler.level), tumbler.level, 0.3],
              [0, tumbler.level]]));
 write_turned("candle.obj", "A candle with a dip at its top, closed, mm",
-  points_of([[0, 0], [20, 0, 0.8], [20, 62, 2.6], [15.2, 61.5, 2.2], [11, 54.5, 6], [0, 53.5]], 6));
+  points_of([[0, 0], [20, 0, 0.8, 6], [20, 62, 2.6, 20], [15.2, 61.5, 2.2, 10], [11, 54.5, 6], [0, 53.5]]), 72);
 // A flame: a drop with its tip up.
 const flame = [];
 for (let k = 0; k <= 24; ++k) {
