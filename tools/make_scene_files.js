@@ -151,7 +151,7 @@ function write_turned(name, what, points, segments = 96) {
 
 // A tumbler, its wall 1.6 mm thick. The milk reaches into the wall, as milk wets glass: there is no air between them, and the
 // glass's inner face ends just below the surface of the milk.
-const tumbler = { foot: 15, rim: 18, height: 44, wall: 1.6, level: 34, bottom: 4 };
+const tumbler = { foot: 15, rim: 18, height: 44, wall: 1.6, level: 34, bottom: 1.8 };
 const outer = (y) => tumbler.foot + ((tumbler.rim - tumbler.foot) * y) / tumbler.height;
 const wetted = (y) => outer(y) - tumbler.wall + 0.5;
 const ends_at = tumbler.level - 0.6;
@@ -159,10 +159,10 @@ const ends_at = tumbler.level - 0.6;
 write_studio(256, 128);
 fs.mkdirSync(path.join(scenes, "shapes"), { recursive: true });
 write_turned("tumbler.obj", "Clear glass: outside, rim and the inside down to the milk, mm",
-  points_of([[0, 0.2], [outer(0), 0.2, 2], [outer(tumbler.height), tumbler.height, 0.7],
+  points_of([[0, 0.2], [outer(0), 0.2, 1], [outer(tumbler.height), tumbler.height, 0.7],
              [outer(tumbler.height) - tumbler.wall, tumbler.height, 0.7], [outer(ends_at) - tumbler.wall, ends_at]]));
 write_turned("milk.obj", "What fills tumbler.obj, closed, mm",
-  points_of([[0, tumbler.bottom], [wetted(tumbler.bottom), tumbler.bottom, 2.5], [wetted(tumbler.level), tumbler.level, 0.3],
+  points_of([[0, tumbler.bottom], [wetted(tumbler.bottom), tumbler.bottom, 1], [wetted(tumbler.level), tumbler.level, 0.3],
              [0, tumbler.level]]));
 write_turned("candle.obj", "A candle with a dip at its top, closed, mm",
   points_of([[0, 0], [20, 0, 0.8, 6], [20, 62, 2.6, 20], [15.2, 61.5, 2.2, 10], [11, 54.5, 6], [0, 53.5]]), 72);
