@@ -1,5 +1,5 @@
 #!/usr/bin/env node
-// Makes what the example scenes read beside themselves: scenes/studio.hdr and the turned shapes of scenes/shapes/.
+// Makes what the example scenes read beside themselves: scenes/studio.hdr and the meshes of scenes/shapes/.
 "use strict";
 const fs = require("fs");
 const path = require("path");
@@ -64,7 +64,8 @@ function run_lengths(bytes) {
       continue;
     }
     const begin = i;
-    const repeats = (at) => at + 2 < bytes.length && bytes[at] === bytes[at + 1] && bytes[at] === bytes[at + 2];
+    const repeats = (at) =>
+      at + 2 < bytes.length && bytes[at] === bytes[at + 1] && bytes[at] === bytes[at + 2];
     while (i < bytes.length && i - begin < 128 && !repeats(i)) ++i;
     out.push(i - begin, ...bytes.slice(begin, i));
   }
@@ -81,19 +82,21 @@ function write_studio(width, height) {
         const theta = Math.PI * ((row + (Math.floor(i / n) + 0.5) / n) / height);
         const phi = 2 * Math.PI * ((column + ((i % n) + 0.5) / n) / width);
         const s = Math.sin(theta);
-        studio([s * Math.sin(phi), Math.cos(theta), -s * Math.cos(phi)]).forEach((v, k) => (sum[k] += v / (n * n)));
+        const colour = studio([s * Math.sin(phi), Math.cos(theta), -s * Math.cos(phi)]);
+        for (let k = 0; k < 3; ++k) sum[k] += colour[k] / (n * n);
       }
       texels.push(rgbe(sum));
     }
     out.push(2, 2, width >> 8, width & 255);
     for (let plane = 0; plane < 4; ++plane) out.push(...run_lengths(texels.map((t) => t[plane])));
   }
-  const header = `#?RADIANCE\n# tools/make_scene_files.js\nFORMAT=32-bit_rle_rgbe\n\n-Y ${height} +X ${width}\n`;
+  const header =
+    `#?RADIANCE\n# tools/make_scene_files.js\nFORMAT=32-bit_rle_rgbe\n\n-Y ${height} +X ${width}\n`;
   fs.writeFileSync(path.join(scenes, "studio.hdr"), Buffer.concat([Buffer.from(header), Buffer.from(out)]));
 }
 
-// ---- Turned shapes. A profile is a polyline of [radius, height, rounding, facets of the rounding] around the y-axis,
-// ---- with the inside to its left; rounded corners and straight lines between them have exact normals.
+// ---- Turned shapes. A profile is a polyline of [radius, height, rounding, facets of the rounding] around the
+// ---- y-axis, with the inside to its left; rounded corners and the lines between them have exact normals.
 
 function points_of(profile) {
   const points = [];  // [r, y, normal r, normal y]
@@ -109,8 +112,10 @@ function points_of(profile) {
       points.push([corner[0], corner[1], t[1], -t[0]]);
       return;
     }
-    const turn = Math.atan2(before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1]);
-    const radius = corner[2], arc_steps = corner[3] || 8, reach = radius * Math.tan(Math.abs(turn) / 2), side = Math.sign(turn);
+    const turn = Math.atan2(before[0] * after[1] - before[1] * after[0],
+                            before[0] * after[0] + before[1] * after[1]);
+    const radius = corner[2], arc_steps = corner[3] || 8, side = Math.sign(turn);
+    const reach = radius * Math.tan(Math.abs(turn) / 2);
     const start = [corner[0] - before[0] * reach, corner[1] - before[1] * reach];
     const centre = [start[0] - before[1] * radius * side, start[1] + before[0] * radius * side];
     for (let k = 0; k <= arc_steps; ++k) {
@@ -131,7 +136,8 @@ function write_turned(name, what, points, segments = 96) {
     for (let j = 0; j < (r < 1e-9 ? 1 : segments); ++j) {
       const c = Math.cos((2 * Math.PI * j) / segments), s = Math.sin((2 * Math.PI * j) / segments);
       lines.push(`v ${fixed(r * c)} ${fixed(y)} ${fixed(r * s)}`);
-      lines.push(r < 1e-9 ? `vn 0 ${ny < 0 ? -1 : 1} 0` : `vn ${fixed(nr * c)} ${fixed(ny)} ${fixed(nr * s)}`);
+      const normal = r < 1e-9 ? [0, Math.sign(ny), 0] : [nr * c, ny, nr * s];
+      lines.push(`vn ${normal.map(fixed).join(" ")}`);
       ring.push(++count);
     }
     rings.push(ring);
@@ -149,8 +155,8 @@ function write_turned(name, what, points, segments = 96) {
   fs.writeFileSync(path.join(scenes, "shapes", name), lines.join("\n") + "\n");
 }
 
-// A tumbler, its wall 1.6 mm thick. The milk reaches into the wall, as milk wets glass: there is no air between them, and the
-// glass's inner face ends just below the surface of the milk.
+// A tumbler, its wall 1.6 mm thick. The milk reaches into the wall, as milk wets glass: there is no air between
+// them, and the glass's inner face ends just below the surface of the milk.
 const tumbler = { foot: 15, rim: 18, height: 44, wall: 1.6, level: 34, bottom: 1.8 };
 const outer = (y) => tumbler.foot + ((tumbler.rim - tumbler.foot) * y) / tumbler.height;
 const wetted = (y) => outer(y) - tumbler.wall + 0.5;
@@ -160,12 +166,14 @@ write_studio(256, 128);
 fs.mkdirSync(path.join(scenes, "shapes"), { recursive: true });
 write_turned("tumbler.obj", "Clear glass: outside, rim and the inside down to the milk, mm",
   points_of([[0, 0.2], [outer(0), 0.2, 1], [outer(tumbler.height), tumbler.height, 0.7],
-             [outer(tumbler.height) - tumbler.wall, tumbler.height, 0.7], [outer(ends_at) - tumbler.wall, ends_at]]));
+             [outer(tumbler.height) - tumbler.wall, tumbler.height, 0.7],
+             [outer(ends_at) - tumbler.wall, ends_at]]));
 write_turned("milk.obj", "What fills tumbler.obj, closed, mm",
-  points_of([[0, tumbler.bottom], [wetted(tumbler.bottom), tumbler.bottom, 1], [wetted(tumbler.level), tumbler.level, 0.3],
-             [0, tumbler.level]]));
+  points_of([[0, tumbler.bottom], [wetted(tumbler.bottom), tumbler.bottom, 1],
+             [wetted(tumbler.level), tumbler.level, 0.3], [0, tumbler.level]]));
 write_turned("candle.obj", "A candle with a dip at its top, closed, mm",
-  points_of([[0, 0], [20, 0, 0.8, 6], [20, 62, 2.6, 20], [15.2, 61.5, 2.2, 10], [11, 54.5, 6], [0, 53.5]]), 72);
+  points_of([[0, 0], [20, 0, 0.8, 6], [20, 62, 2.6, 20], [15.2, 61.5, 2.2, 10], [11, 54.5, 6],
+             [0, 53.5]]), 72);
 // A flame: a drop with its tip up.
 const flame = [];
 for (let k = 0; k <= 24; ++k) {
@@ -179,12 +187,14 @@ write_turned("flame.obj", "A flame, mm", flame, 48);
 
 // The wedge: steps of 1, 2, ... mm, flat at the back, each 14 mm wide and 46 mm high.
 function write_wedge(steps, width, height) {
-  const lines = [`# A step wedge, 1 to ${steps} mm thick, closed, mm; by tools/make_scene_files.js`], outline = [[0, 0]];
+  const lines = [`# A step wedge, 1 to ${steps} mm thick, closed, mm; by tools/make_scene_files.js`];
+  const outline = [[0, 0]];
   for (let i = 1; i <= steps; ++i) outline.push([(i - 1) * width, i], [i * width, i]);
   outline.push([steps * width, 0]);
   // Points where steps begin, on the back, so that no edge ends in the middle of another.
   for (let i = steps - 1; i > 0; --i) outline.push([i * width, 0]);
-  for (const y of [0, height]) for (const [x, z] of outline) lines.push(`v ${x - (steps * width) / 2} ${y} ${z}`);
+  for (const y of [0, height])
+    for (const [x, z] of outline) lines.push(`v ${x - (steps * width) / 2} ${y} ${z}`);
   const n = outline.length;
   for (let i = 0; i < n; ++i) {
     const k = (i + 1) % n;
@@ -192,7 +202,8 @@ function write_wedge(steps, width, height) {
   }
   // Both ends, step by step: a column's corners are back left, front left, front right, back right.
   for (let i = 1; i <= steps; ++i) {
-    const back = (at) => (at === 0 ? 1 : at === steps ? 2 * steps + 2 : 3 * steps + 2 - at);  // at the x of step `at`
+    // The back's vertex where step `at` ends.
+    const back = (at) => (at === 0 ? 1 : at === steps ? 2 * steps + 2 : 3 * steps + 2 - at);
     const column = [back(i - 1)];
     if (i > 1) column.push(2 * i - 1);  // where the step before ends
     column.push(2 * i, 2 * i + 1, back(i));
