@@ -165,7 +165,7 @@ const ends_at = tumbler.level - 0.6;
 write_studio(256, 128);
 fs.mkdirSync(path.join(scenes, "shapes"), { recursive: true });
 write_turned("tumbler.obj", "Clear glass: outside, rim and the inside down to the milk, mm",
-  points_of([[0, 0.2], [outer(0), 0.2, 1], [outer(tumbler.height), tumbler.height, 0.7],
+  points_of([[0, 0.2], [outer(0), 0.2, 0.4, 6], [outer(tumbler.height), tumbler.height, 0.7],
              [outer(tumbler.height) - tumbler.wall, tumbler.height, 0.7],
              [outer(ends_at) - tumbler.wall, ends_at]]));
 write_turned("milk.obj", "What fills tumbler.obj, closed, mm",
