@@ -117,6 +117,7 @@ Warnings check_density(const Scene& scene, const Cache& cache) {
   Warnings warnings;
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
     const Medium& medium = scene.media[m];
+    if (medium.lambert) continue;  // uses no samples
     const CacheGroup& group = cache.groups[m];
     const double spacing =
         hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * medium.scale;
@@ -264,6 +265,9 @@ void run(const Options& options, const std::string& command_line) {
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Warnings warnings;
     Image image = render(world, cache, params[i], session.progress(), session.report(), warnings);
+    if (pictures.size() > 1)
+      for (std::string& warning : warnings)
+        warning += fmt::format(" (camera {})", scene.cameras[params[i].camera].id);
     session.warn(warnings);
     image.metadata = {{"nacre:version", kVersion},
                       {"nacre:command", command_line},

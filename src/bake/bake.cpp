@@ -129,11 +129,14 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     if (!std::isfinite(length))
       fail(ErrorCode::kValue, medium.place, "{} neither scatters nor absorbs; give it coefficients above 0",
            medium_label(scene, m));
-    weights.push_back(group.surface_area / square(length));
+    // Nothing is summed over the samples of a medium that is taken for an opaque surface; one keeps its
+    // place.
+    weights.push_back(medium.lambert ? 0 : group.surface_area / square(length));
     total_weight += weights.back();
     const double spacing = params.spacing_mm ? *params.spacing_mm / medium.scale : kDefaultSpacing * length;
     group.points = 2 / std::sqrt(3.0) * group.surface_area / square(spacing);
     if (!params.spacing_mm) group.points *= settings.sample_multiplier;
+    if (medium.lambert) group.points = 1;
     group.irradiance_samples = params.irradiance_samples.value_or(
         settings.irradiance_samples > 0 ? settings.irradiance_samples : kDefaultIrradianceSamples);
     group.bounces = irradiance_bounces(scene, m, params.bounces);
@@ -143,7 +146,7 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     fail(ErrorCode::kValue, scene.path, "no shape is translucent; give one a <subsurface type=\"dipole\">");
   for (std::size_t m = 0; m < plan.groups.size(); ++m) {
     GroupPlan& group = plan.groups[m];
-    if (params.points) group.points = *params.points * weights[m] / total_weight;
+    if (params.points && weights[m] > 0) group.points = *params.points * weights[m] / total_weight;
     group.points = std::max(group.points, 1.0);
     group.spacing_mm = hexagonal_spacing(group.surface_area, group.points) * scene.media[m].scale;
     plan.points += group.points;

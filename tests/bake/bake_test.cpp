@@ -152,6 +152,19 @@ TEST(PlanBake, EveryGroupGetsASample) {
   EXPECT_NEAR(plan.points, plan.groups[0].points + plan.groups[1].points, 1e-9);
 }
 
+TEST(PlanBake, LeavesOutWhatIsTakenForOpaque) {
+  Scene scene = two_media();
+  scene.media[0].lambert = true;
+  BakeParams params;
+  EXPECT_EQ(plan_bake(scene, params).groups[0].points, 1);
+  EXPECT_GT(plan_bake(scene, params).groups[1].points, 100);
+  params.points = 500;
+  EXPECT_NEAR(plan_bake(scene, params).groups[1].points, 500, 1e-6);
+  scene.media[1].lambert = true;
+  EXPECT_EQ(plan_bake(scene, params).points, 2);
+  EXPECT_EQ(run(scene, params).groups.size(), 2u);
+}
+
 TEST(PlanBake, RefusesTooManySamples) {
   using Limits = std::numeric_limits<double>;
   for (const double points : {2.01e8, 1e300, Limits::infinity(), Limits::quiet_NaN()}) {
