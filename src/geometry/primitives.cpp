@@ -66,8 +66,9 @@ Mesh make_sphere() {
     double phi = std::atan2(p.y, p.x);
     if (phi < 0) phi += 2 * kPiD;
     mesh.positions.emplace_back(p);
+    // Upright: v = 0 is the bottom of a picture, and the south pole.
     mesh.uvs.emplace_back(static_cast<float>(phi / (2 * kPiD)),
-                          static_cast<float>(std::acos(std::clamp(p.z, -1.0, 1.0)) / kPiD));
+                          1 - static_cast<float>(std::acos(std::clamp(p.z, -1.0, 1.0)) / kPiD));
   }
   // u jumps from 1 to 0 at phi = 0 and is undefined at the poles: the triangles there get vertices of their
   // own, so that u runs on beyond 1 and every triangle at a pole has the u of its middle there.
@@ -118,7 +119,8 @@ Mesh make_rectangle() {
 }
 
 Mesh make_cube() {
-  // For each face its normal and the direction of u; v grows along u x normal (mirrored, as in Mitsuba).
+  // For each face its normal and the direction of u, those of Mitsuba; v grows along normal x u, so that
+  // pictures, whose v = 0 is at the bottom here, are not mirrored.
   struct Face {
     Vec3 normal, u;
   };
@@ -129,12 +131,12 @@ Mesh make_cube() {
     const auto base = static_cast<std::uint32_t>(mesh.positions.size());
     for (const Vec2& uv : {Vec2(0, 0), Vec2(1, 0), Vec2(1, 1), Vec2(0, 1)}) {
       mesh.positions.push_back(face.normal + face.u * (2 * uv.x - 1) +
-                               cross(face.u, face.normal) * (2 * uv.y - 1));
+                               cross(face.normal, face.u) * (2 * uv.y - 1));
       mesh.normals.push_back(face.normal);
       mesh.uvs.push_back(uv);
     }
-    mesh.triangles.push_back({base, base + 2, base + 1});
-    mesh.triangles.push_back({base, base + 3, base + 2});
+    mesh.triangles.push_back({base, base + 1, base + 2});
+    mesh.triangles.push_back({base, base + 2, base + 3});
   }
   return mesh;
 }

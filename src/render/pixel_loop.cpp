@@ -12,6 +12,8 @@ namespace {
 constexpr int kMaxDirectWaves = 12, kMaxWaves = 300;
 // Edges at which both ways at smooth boundaries are followed, and edges before Russian roulette.
 constexpr int kSplitWaves = 4, kSureDepth = 5;
+// Below this number of samples per pixel the negative lobes of filters are left out.
+constexpr int kLeastSignedSamples = 16;
 // The share of a pixel below which a way is not followed.
 constexpr float kLeastThroughput = 1e-4f;
 
@@ -88,8 +90,10 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size
       const FilterSample offset = filter_.sample(sobol_2d(sample, key));
       Path path;
       path.ray.ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
-      path.throughput = Rgb(offset.weight);
-      pixels.weight[pixel] += offset.weight;
+      // Of a few samples the weights might hardly add up to anything.
+      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : offset.weight;
+      path.throughput = Rgb(weight);
+      pixels.weight[pixel] += weight;
       path.pixel = pixel;
       path.sample = sample;
       paths.push_back(path);

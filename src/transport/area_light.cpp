@@ -43,13 +43,15 @@ double solid_angle(const SphericalTriangle& c) {
 
 // Running sums of the triangles' solid angles.
 struct Spans {
-  std::array<double, kMostSpanned> cumulative{};
+  std::array<SphericalTriangle, kMostSpanned> triangles;
+  std::array<double, kMostSpanned> cumulative;
   double total = 0;
 };
 bool measure_spans(const Mesh& mesh, const Vec3& x, Spans& spans) {
   if (mesh.triangles.size() > kMostSpanned) return false;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    spans.total += solid_angle(project(mesh, t, x));
+    spans.triangles[t] = project(mesh, t, x);
+    spans.total += solid_angle(spans.triangles[t]);
     spans.cumulative[t] = spans.total;
   }
   return spans.total > kLeastSolidAngle;
@@ -102,7 +104,7 @@ AreaSample sample_area_light(const Mesh& mesh, const Distribution& areas, const 
     const double before = triangle == 0 ? 0 : spans.cumulative[triangle - 1];
     const double angle = spans.cumulative[triangle] - before;
     const Vec3d direction =
-        sample_direction(project(mesh, triangle, x), angle,
+        sample_direction(spans.triangles[triangle], angle,
                          std::min((choice * spans.total - before) / angle, 1.0), static_cast<double>(u.y));
     return {meet(mesh, triangle, x, direction), static_cast<float>(1 / spans.total)};
   }

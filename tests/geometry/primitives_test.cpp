@@ -51,7 +51,7 @@ TEST(Primitives, SphereTextureCoordinatesAreSpherical) {
     for (const std::uint32_t v : t) {
       const Vec3& p = sphere.positions[v];
       const Vec2& uv = sphere.uvs[v];
-      EXPECT_NEAR(uv.y, std::acos(std::clamp(p.z, -1.0f, 1.0f)) / kPi, 1e-4);
+      EXPECT_NEAR(1 - uv.y, std::acos(std::clamp(p.z, -1.0f, 1.0f)) / kPi, 1e-4);
       const float radius = std::hypot(p.x, p.y);
       if (radius > 1e-6f) {
         EXPECT_NEAR(std::cos(2 * kPi * uv.x), p.x / radius, 1e-4);
@@ -84,11 +84,11 @@ TEST(Primitives, Cube) {
   EXPECT_EQ(bounds(mesh).min, Vec3(-1));
   EXPECT_EQ(bounds(mesh).max, Vec3(1));
   EXPECT_TRUE(analyse_topology(mesh).closed());
-  // The corner of the +x face at which Mitsuba has (0, 1).
+  // The corner of the +x face at which Mitsuba, whose v = 0 is the top of a picture, has (0, 1).
   bool found = false;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (mesh.normals[v] == Vec3(1, 0, 0) && mesh.positions[v] == Vec3(1, -1, -1)) {
-      EXPECT_EQ(mesh.uvs[v], Vec2(0, 1));
+      EXPECT_EQ(mesh.uvs[v], Vec2(0, 0));
       found = true;
     }
   EXPECT_TRUE(found);
@@ -135,6 +135,16 @@ TEST(Primitives, CylinderRefusesBadInput) {
   EXPECT_THROW(make_cylinder(Vec3(0), Vec3(0, 0, 1), nan, "a:1"), Error);
   EXPECT_THROW(make_cylinder(Vec3(2), Vec3(2), 1, "a:1"), Error);
   EXPECT_THROW(make_cylinder(Vec3(nan), Vec3(2), 1, "a:1"), Error);
+}
+
+// Seen from outside, u to v turns counter-clockwise on every face: pictures are not mirrored.
+TEST(Primitives, TextureCoordinatesAreNotMirrored) {
+  for (const Mesh& mesh : {make_cube(), make_rectangle(), make_sphere()})
+    for (const Triangle& t : mesh.triangles) {
+      const Vec2 a = mesh.uvs[t[1]] - mesh.uvs[t[0]], b = mesh.uvs[t[2]] - mesh.uvs[t[0]];
+      EXPECT_GT(a.x * b.y - a.y * b.x, 0);
+    }
+  EXPECT_NEAR(signed_volume(make_cube()), 8, 1e-6);
 }
 
 }  // namespace

@@ -77,6 +77,15 @@ TEST(Filters, OnlyMitchellGoesBelowZero) {
   }
 }
 
+// A few signed weights would add up to anything, below zero too.
+TEST(Filters, FewSamplesHaveNoNegativeWeights) {
+  for (const int samples : {1, 2, 4, 15}) {
+    const Image image = render_quietly(scene_of(sensor("mitchell") + kLampAhead), samples);
+    for (const char* name : {"R", "G", "B", "A"})
+      for (const float v : channel(image, name).values) ASSERT_GT(v, 0) << samples << name;
+  }
+}
+
 // Bright stripes at the distance of focus are sharp, twice as far they are blurred.
 TEST(Cameras, ThinLensBlursWhatIsOutOfFocus) {
   std::string stripes;
