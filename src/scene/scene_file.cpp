@@ -325,13 +325,21 @@ void Builder::warn_about_shape(const Shape& shape) {
   const std::string problems = describe_problems(analyse_topology(shape.mesh));
   if (!problems.empty()) warn(shape.place, fmt::format("{} is translucent, but {}", shape.id, problems));
   if (shape.surface == kNone) return;
-  const auto* boundary =
-      std::get_if<DielectricSurface>(&scene_.surfaces[static_cast<std::size_t>(shape.surface)].model);
+  const auto& model = scene_.surfaces[static_cast<std::size_t>(shape.surface)].model;
+  if (std::holds_alternative<ConductorSurface>(model))
+    fail(ErrorCode::kValue, shape.place, "{}: no light passes a conductor into a medium; remove one of them",
+         shape.id);
   const float eta = scene_.media[static_cast<std::size_t>(shape.medium)].eta();
-  if (boundary && std::abs(boundary->int_ior / boundary->ext_ior - eta) > 1e-3f)
-    warn(shape.place, fmt::format("{}: the boundary has the relative index {:.4g} of the subsurface, the "
-                                  "{:.4g} of the dielectric is ignored",
-                                  shape.id, eta, boundary->int_ior / boundary->ext_ior));
+  const auto check_index = [&](const char* type, float int_ior, float ext_ior) {
+    if (std::abs(int_ior / ext_ior - eta) > 1e-3f)
+      warn(shape.place, fmt::format("{}: the boundary has the relative index {:.4g} of the subsurface, the "
+                                    "{:.4g} of the {} is ignored",
+                                    shape.id, eta, int_ior / ext_ior, type));
+  };
+  if (const auto* glass = std::get_if<DielectricSurface>(&model))
+    check_index("dielectric", glass->int_ior, glass->ext_ior);
+  if (const auto* plastic = std::get_if<PlasticSurface>(&model))
+    check_index("plastic", plastic->int_ior, plastic->ext_ior);
 }
 
 void Builder::warn_about_textures(const Shape& shape) {

@@ -108,14 +108,18 @@ float CoatTransmittance::eval(float mu) const noexcept {
 Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
   Bsdf bsdf;
   if (surface) {
-    bsdf = std::visit([](const auto& model) { return from_model(model); }, surface->model);
+    auto model = surface->model;
+    if (auto* plastic = std::get_if<PlasticSurface>(&model); plastic && medium) {
+      plastic->int_ior = medium->int_ior;
+      plastic->ext_ior = medium->ext_ior;
+    }
+    bsdf = std::visit([](const auto& m) { return from_model(m); }, model);
     bsdf.textures = surface->textures;
     bsdf.two_sided = surface->two_sided;
   } else {
     bsdf = medium ? from_model(DielectricSurface{}) : from_model(DiffuseSurface{});
   }
-  // What passes the boundary of a medium is the medium's to answer for, and a bare boundary is that of the
-  // medium's eta.
+  // What passes the boundary of a medium is the medium's to answer for, and so is the boundary's index.
   if (medium && bsdf.transmits) {
     bsdf.transmits = false;
     bsdf.two_sided = true;

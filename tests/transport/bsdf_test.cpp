@@ -108,13 +108,13 @@ TEST(Bsdf, GlassTransmitsUnlessAMediumIsBehindIt) {
   EXPECT_FLOAT_EQ(boundary.eta, medium.eta());
 }
 
-TEST(Bsdf, PlasticOverAMediumKeepsItsCoat) {
+TEST(Bsdf, PlasticOverAMediumHasItsIndex) {
   const Surface surface{"", "", PlasticSurface{}};
   Medium medium;
   const Bsdf bsdf = make_bsdf(&surface, &medium);
   EXPECT_TRUE(bsdf.coated);
   EXPECT_FALSE(bsdf.transmits);
-  EXPECT_FLOAT_EQ(bsdf.eta, 1.49f / 1.000277f);
+  EXPECT_FLOAT_EQ(bsdf.eta, medium.eta());
   EXPECT_EQ(bsdf.diffuse, Rgb(0.5f, 0.5f, 0.5f));
 }
 
