@@ -166,7 +166,7 @@ void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vect
   ScatterPoint at = scatter_point(world_, path.hit, -path.ray.ray.direction);
   Bsdf& bsdf = at.surface.bsdf;
   const bool translucent = world_.shape(path.hit).medium != kNone;
-  const Layer layer = wave == 0 && translucent && bsdf.specular ? Layer::kSpecular : path.layer;
+  const Layer layer = wave == 0 && translucent ? Layer::kSpecular : path.layer;
   const std::uint64_t key =
       pixel_key(path.pixel, hash_words(1, static_cast<std::uint64_t>(wave), path.branch));
   if (bsdf.specular && !bsdf.rough() && wave < kSplitWaves && path.scattered == 0) {
@@ -180,12 +180,11 @@ void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vect
     bsdf.specular = false;
   }
   const int samples = path.scattered == 0 ? light_samples_ : 1;
-  const Layer rest = bsdf.specular ? layer : path.layer;
-  pixels.add(rest, path.pixel,
+  pixels.add(layer, path.pixel,
              path.throughput * reflect_direct_light(world_, at, samples, key,
                                                     path.sample * static_cast<std::uint32_t>(samples),
                                                     Continuation::kGoesOn));
-  follow(path, next_ray(world_, at, path.ray, samples, key, path.sample), rest, key, next);
+  follow(path, next_ray(world_, at, path.ray, samples, key, path.sample), layer, key, next);
 }
 
 void PixelLoop::follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,

@@ -40,12 +40,13 @@ float ray_share(const World& world, const PathRay& ray, std::size_t light, float
 
 }  // namespace
 
-LobeSpan lobe_span(const Bsdf& bsdf) noexcept {
+LobeSpan lobe_span(const Bsdf& bsdf, float cos_o) noexcept {
   constexpr float kDiffuse = kPi;
   if (!bsdf.specular || !bsdf.rough()) return {};
   // Mirrored directions turn by twice as much as facets do.
   const float rough = std::min(4 * kPi * bsdf.roughness.u * bsdf.roughness.v, kDiffuse);
-  return {rough, is_black(bsdf.diffuse) ? rough : kDiffuse};
+  // Seen aslant, facets turn them as much in the plane of incidence and less across it.
+  return {rough * std::clamp(cos_o, 0.0f, 1.0f), is_black(bsdf.diffuse) ? rough : kDiffuse};
 }
 
 float connection_weight(float light_pdf, float connections, float rays, const LobeSpan& span) noexcept {
@@ -86,7 +87,7 @@ Rgb reflect_direct_light(const World& world, const ScatterPoint& at, int samples
   const Bsdf& bsdf = at.surface.bsdf;
   if (is_black(bsdf.diffuse) && !(bsdf.specular && bsdf.rough())) return sum;
   // Rays do not see what they would if nothing blocked light.
-  const LobeSpan span = lobe_span(bsdf);
+  const LobeSpan span = lobe_span(bsdf, std::abs(dot(at.surface.frame.n, at.out)));
   const bool shared = continuation == Continuation::kGoesOn && world.shadows;
   for_each_connection(world, at.point.position, connecting_normal(at), samples, hash_words(key, kConnection),
                       first_sample, [&](const Connection& connection) {
@@ -121,7 +122,7 @@ NextRay next_ray(const World& world, const ScatterPoint& at, const PathRay& befo
   next.ray.position = at.point.position;
   next.ray.normal = connecting_normal(at);
   next.ray.light_samples = light_samples;
-  next.ray.span = lobe_span(at.surface.bsdf);
+  next.ray.span = lobe_span(at.surface.bsdf, std::abs(dot(at.surface.frame.n, at.out)));
   return next;
 }
 

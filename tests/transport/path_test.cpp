@@ -72,7 +72,8 @@ TEST(Path, FurnaceWithWalls) {
 // rays weighted against each other have the mean of either alone, and never twice the variance of the better.
 TEST(Path, WeightsAreNeverMuchWorseThanEitherStrategy) {
   for (const float alpha : {0.0f, 0.05f, 0.2f, 0.6f})  // 0: diffuse
-    for (const float size : {0.1f, 1.0f, 8.0f}) {
+    for (const auto& [size, slope] : {std::pair(0.1f, 1.0f), std::pair(1.0f, 1.0f), std::pair(8.0f, 1.0f),
+                                      std::pair(0.5f, 0.05f), std::pair(2.0f, 0.05f)}) {
       Scene scene;
       int surface = 0;
       if (alpha == 0) {
@@ -83,9 +84,17 @@ TEST(Path, WeightsAreNeverMuchWorseThanEitherStrategy) {
         surface = add_surface(scene, {"", "", metal});
       }
       add_shape(scene, placed(make_rectangle(), 1, {0, 0, 0}), surface);
-      add_area_light(scene, flipped(placed(make_rectangle(), size, {-0.5f, 0, 2})), {10, 10, 10});
+      // Seen from above, or aslant with a lamp that stands upright in the mirror's direction.
+      if (slope == 1) {
+        add_area_light(scene, flipped(placed(make_rectangle(), size, {-0.5f, 0, 2})), {10, 10, 10});
+      } else {
+        Mesh lamp = placed(make_rectangle(), size, {0, 0, 0});
+        for (Vec3& p : lamp.positions) p = Vec3(-4, p.x, 0.2f + size + p.y);
+        lamp.normals.clear();
+        add_area_light(scene, std::move(lamp), {10, 10, 10});
+      }
       const World world = make_world(scene, true);
-      const Vec3 out = Vec3(0.4f, 0.1f, 1).normalized();
+      const Vec3 out = (slope == 1 ? Vec3(0.4f, 0.1f, 1) : Vec3(1, 0.02f, slope)).normalized();
       const Hit hit = world.tracer.intersect({{0.1f, 0.1f, 0.5f}, {0, 0, -1}});
       const ScatterPoint at = scatter_point(world, hit, out);
       const PathRay eye = from_eye({0.1f, 0.1f, 0.5f}, {0, 0, -1});
@@ -115,7 +124,7 @@ TEST(Path, WeightsAreNeverMuchWorseThanEitherStrategy) {
       EXPECT_GT(both.mean, 0);
       EXPECT_NEAR(both.mean, reference, 4 * error + 1e-4 * reference) << alpha << " " << size;
       EXPECT_LT(both.variance, 2 * std::min(connections.variance, rays.variance) + 1e-7 * square(reference))
-          << alpha << " " << size << ": " << connections.variance << " " << rays.variance;
+          << alpha << " " << size << " " << slope << ": " << connections.variance << " " << rays.variance;
     }
 }
 

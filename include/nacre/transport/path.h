@@ -15,7 +15,8 @@ namespace nacre {
 struct LobeSpan {
   float narrow = kPi, wide = kPi;  // a cosine
 };
-LobeSpan lobe_span(const Bsdf& bsdf) noexcept;
+/// `cos_o` is the cosine of the view: lobes become narrower towards grazing angles.
+LobeSpan lobe_span(const Bsdf& bsdf, float cos_o) noexcept;
 
 /// Weight of connections to a light where rays look for it as well; that of rays is what is missing to 1.
 /// `light_pdf` is the density of one connection per steradian, `connections` and `rays` are the densities
