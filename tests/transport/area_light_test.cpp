@@ -18,7 +18,7 @@ void expect_density(const Mesh& mesh, const Vec3& x, const char* what) {
   const Distribution areas(triangle_areas(mesh));
   const Mesh* meshes[] = {&mesh};
   const RayTracer tracer(meshes);
-  constexpr int kCos = 12, kPhi = 24, kSamples = 200000, kFine = 24;
+  constexpr int kCos = 12, kPhi = 24, kSamples = 200000, kFine = 64;
   std::vector<double> observed(kCos * kPhi), expected(kCos * kPhi);
   for (std::uint32_t n = 0; n < kSamples; ++n) {
     Rng rng(hash_words(5, n));
@@ -47,7 +47,7 @@ void expect_density(const Mesh& mesh, const Vec3& x, const char* what) {
           static_cast<double>(pdf_area_light(mesh, areas, x, hit)) * kSamples * 4 * kPiD /
           (kCos * kPhi * kFine * kFine);
     }
-  // Bins at an edge of the light are known to a part of their own only.
+  // Where the edge of the light cuts cells of the fine grid, they count in full or not at all.
   double total = 0;
   for (std::size_t i = 0; i < observed.size(); ++i) {
     total += expected[i];
