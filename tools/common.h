@@ -66,9 +66,7 @@ struct BakeOptions {
   std::optional<double> points, spacing;
   std::optional<int> irradiance_samples, bounces;
   bool no_shadows = false, interreflect = false;
-  bool any_but_shadows() const {
-    return points || spacing || irradiance_samples || bounces || interreflect;
-  }
+  bool any_but_shadows() const { return points || spacing || irradiance_samples || bounces || interreflect; }
   BakeParams params(const CommonOptions& common) const;
 };
 void add_bake_options(CLI::App& command, BakeOptions& options);

@@ -28,6 +28,9 @@ struct Options {
 
 // In the order of Method.
 const std::vector<std::string> kMethods{"hierarchical", "exact", "montecarlo", "lambert"};
+Method method_of(const Options& options) {
+  return static_cast<Method>(std::find(kMethods.begin(), kMethods.end(), options.method) - kMethods.begin());
+}
 
 AovSelection parse_aovs(const std::string& text) {
   if (text == "all") return {};
@@ -87,8 +90,7 @@ RenderParams make_params(const Options& options, const Scene& scene, const std::
   if (std::int64_t{params.crop_width} * params.crop_height > (std::int64_t{1} << 28))
     throw UsageError("the picture has more than 2^28 pixels; render it in parts with --crop");
   if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
-  params.method =
-      static_cast<Method>(std::find(kMethods.begin(), kMethods.end(), options.method) - kMethods.begin());
+  params.method = method_of(options);
   if (options.tolerance) params.tolerance = *options.tolerance;
   if (options.single_samples) params.single_samples = *options.single_samples;
   if (options.mc_samples) params.mc_samples = *options.mc_samples;
@@ -143,24 +145,24 @@ std::optional<double> parse_exposure(const std::string& text) {
 }
 
 // Options that have nothing to act on are mistakes.
-void check_combination(const Options& options, bool cached) {
+void check_combination(const Options& options) {
+  const Method method = method_of(options);
   if (!options.cache.empty() && options.bake.any_but_shadows())
     throw UsageError(
         "--points, --spacing, --irradiance-samples, --bounces and --interreflect are for baking; --cache is "
-        "baked "
-        "already");
+        "baked already");
   const bool samples_cache = options.bake.points || options.bake.spacing || options.bake.irradiance_samples ||
                              options.bake.interreflect;
-  if (!cached && (!options.cache.empty() || samples_cache))
+  if (!uses_cache(method) && (!options.cache.empty() || samples_cache))
     throw UsageError(
         fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing, "
                     "--irradiance-samples and --interreflect",
                     options.method));
-  if ((options.mc_samples || options.mc_sampling) && options.method != "montecarlo")
+  if ((options.mc_samples || options.mc_sampling) && method != Method::kMonteCarlo)
     throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
-  if (options.tolerance && options.method != "hierarchical")
+  if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
-  if (options.single_samples.value_or(0) > 0 && options.method == "lambert")
+  if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
     throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
 }
 
@@ -243,8 +245,8 @@ void save_picture(const Image& image, const Picture& picture, const Options& opt
 }
 
 void run(const Options& options, const std::string& command_line) {
-  const bool cached = options.method == "hierarchical" || options.method == "exact";
-  check_combination(options, cached);
+  const bool cached = uses_cache(method_of(options));
+  check_combination(options);
   const std::optional<double> exposure = parse_exposure(options.exposure);
   Session session(options.common, command_line);
   const std::vector<Picture> pictures = plan_pictures(options);

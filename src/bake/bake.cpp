@@ -23,8 +23,7 @@ constexpr double kBytesPerSample = 4.0 * static_cast<double>(kPlaneCount) + 64.0
 
 std::vector<const Mesh*> group_meshes(const Scene& scene, std::size_t medium) {
   std::vector<const Mesh*> meshes;
-  for (const Shape& shape : scene.shapes)
-    if (shape.medium == static_cast<int>(medium)) meshes.push_back(&shape.mesh);
+  for (const std::uint32_t i : shapes_of_medium(scene, medium)) meshes.push_back(&scene.shapes[i].mesh);
   return meshes;
 }
 
@@ -73,11 +72,10 @@ std::vector<Rgb> entry_albedos(const World& world, std::size_t medium, std::span
   const Scene& scene = *world.scene;
   const SubsurfaceSettings& settings = scene.subsurface[medium];
   if (settings.albedo_texture == kNone && settings.surface_albedo == Rgb(1, 1, 1)) return {};
-  std::vector<std::uint32_t> shapes, first_triangles;
+  const std::vector<std::uint32_t> shapes = shapes_of_medium(scene, medium);
+  std::vector<std::uint32_t> first_triangles;
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (scene.shapes[i].medium != static_cast<int>(medium)) continue;
-    shapes.push_back(i);
+  for (const std::uint32_t i : shapes) {
     first_triangles.push_back(count);
     count += static_cast<std::uint32_t>(scene.shapes[i].mesh.triangles.size());
   }

@@ -4,7 +4,6 @@
 #include "nacre/base/parallel.h"
 #include "nacre/cache/exitance.h"
 #include "nacre/cache/nearest.h"
-#include "nacre/optics/fresnel.h"
 #include "nacre/transport/surface.h"
 
 namespace nacre {
@@ -20,11 +19,7 @@ TranslucentRadiance::TranslucentRadiance(const World& world, std::span<const Cac
   for (std::size_t m = 0; m < groups.size(); ++m) {
     const CacheGroup& group = groups[m];
     const Medium& medium = world.scene->media[m];
-    const double transmittance = medium.convention == Convention::kConserving
-                                     ? mean_transmittance(static_cast<double>(medium.eta()))
-                                     : 1.0;
-    groups_.push_back(
-        {std::vector<Rgb>(group.size()), medium.eta(), static_cast<float>(1 / (kPiD * transmittance))});
+    groups_.push_back({std::vector<Rgb>(group.size()), exit_factor(medium)});
     const Exitance exitance(group, medium, kTolerance);
     progress.begin("exitance of " + group.name, "samples", group.size());
     // Samples are in octree order: neighbours share their work.
@@ -44,10 +39,8 @@ Rgb TranslucentRadiance::operator()(const Hit& hit, const Vec3& out) const {
   const Group& group = groups_[m];
   const SurfacePoint point = surface_point(world_, hit);
   if (group.exitance.empty() || point.side(out) < 0) return {0, 0, 0};
-  const float cosine = std::min(dot(point.normal_towards(out), out), 1.0f);
   return group.exitance[find_nearest_sample(cache_[m], point.position, point.geometric_normal)] *
-         surface_albedo(world_, hit, false) *
-         ((1 - fresnel_reflectance(cosine, group.eta)) * group.exit_factor);
+         exit_transmittance(world_, hit, point, out) * group.exit_factor;
 }
 
 }  // namespace nacre

@@ -22,7 +22,7 @@ class TranslucentRadiance {
  private:
   struct Group {
     std::vector<Rgb> exitance;  // by sample
-    float eta, exit_factor;
+    float exit_factor;
   };
   const World& world_;
   std::span<const CacheGroup> cache_;

@@ -172,4 +172,11 @@ void check_exr_header(std::string_view head, std::uint64_t file_bytes, const std
          chunks, file_bytes);
 }
 
+void fail_damaged_exr(const std::string& path, const std::exception& error) {
+  // OpenEXR repeats the path, sometimes over two lines.
+  std::string reason = error.what();
+  std::ranges::replace(reason, '\n', ' ');
+  fail(ErrorCode::kSyntax, path, "truncated or damaged OpenEXR file: {}", reason);
+}
+
 }  // namespace nacre

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <string>
 #include <string_view>
 
@@ -17,5 +18,8 @@ inline constexpr std::size_t kMaxExrHeader = std::size_t{4} << 20;
 /// Throws Error: kSyntax, kUnsupported (deep or multi-part files, unknown versions), kLimit.
 /// Source: "OpenEXR File Layout" of the OpenEXR project.
 void check_exr_header(std::string_view head, std::uint64_t file_bytes, const std::string& path);
+
+/// Throws kSyntax with the reason that OpenEXR gave for not reading a file, on one line.
+[[noreturn]] void fail_damaged_exr(const std::string& path, const std::exception& error);
 
 }  // namespace nacre

@@ -1,7 +1,9 @@
-// Reduced coefficients.
+// Numbers that follow from a medium's coefficients and convention.
 #include "nacre/optics/medium.h"
 
 #include <limits>
+
+#include "nacre/optics/fresnel.h"
 
 namespace nacre {
 
@@ -18,6 +20,12 @@ Reduced reduce(const Medium& medium) {
         sigma_t_prime > 0 ? static_cast<float>(1.0 / sigma_t_prime) : std::numeric_limits<float>::infinity();
   }
   return reduced;
+}
+
+float exit_factor(const Medium& medium) {
+  const double transmittance =
+      medium.convention == Convention::kConserving ? mean_transmittance(double{medium.eta()}) : 1.0;
+  return static_cast<float>(1 / (kPiD * transmittance));
 }
 
 float smallest_mean_free_path(const Medium& medium) { return min_channel(reduce(medium).mean_free_path); }

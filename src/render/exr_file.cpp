@@ -198,10 +198,7 @@ Image load_exr(const std::string& path) {
   } catch (const std::bad_alloc&) {
     fail(ErrorCode::kLimit, path, "the image does not fit into memory");
   } catch (const std::exception& error) {
-    // OpenEXR repeats the path, sometimes over two lines.
-    std::string reason = error.what();
-    std::ranges::replace(reason, '\n', ' ');
-    fail(ErrorCode::kSyntax, path, "truncated or damaged OpenEXR file: {}", reason);
+    fail_damaged_exr(path, error);
   }
 }
 

@@ -9,9 +9,6 @@
 namespace nacre {
 namespace {
 
-// How much of the distance to a light counts, so that the light's own surface does not.
-constexpr float kReach = 1 - 1e-4f;
-
 // Distance to where a ray leaves a box that it starts in, and the normal of the face there.
 float exit_box(const Box3& box, const Vec3& origin, const Vec3& direction, Vec3& normal) {
   float nearest = std::numeric_limits<float>::infinity();
@@ -61,8 +58,7 @@ Interior::Interior(const World& world, std::size_t medium)
     const bool own = shape.medium == medium_;
     if (own) box_.extendBy(bounds(shape.mesh));
     bodies += own;
-    const Bsdf& bsdf = world.bsdfs[passable_.size()];
-    passable_.push_back(own || !world.shadows || (bsdf.transmits && !bsdf.rough()));
+    passable_.push_back(own || !world.shadows || world.clear_glass[passable_.size()]);
   }
   all_.assign(passable_.size(), 1);
   several_bodies_ = bodies > 1;
@@ -77,31 +73,29 @@ Interior::Interior(const World& world, std::size_t medium)
 }
 
 // How many bodies begin at a point of the surface, which more than one do where faces lie upon each other.
-int Interior::bodies_below(const SurfacePoint& at, float side) const {
+int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& room) const {
   if (!several_bodies_) return 1;
   const Vec3 above = at.origin(side), below = at.origin(-side);
-  std::vector<Hit> hits;
-  std::vector<Crossing> crossings;
-  if (!world_.tracer.collect({above, below - above, 0, 1}, all_, hits)) return 1;
-  find_crossings(above, (below - above).normalized(), hits, crossings);
+  if (!world_.tracer.collect({above, below - above, 0, 1}, all_, room.hits)) return 1;
+  find_crossings(above, (below - above).normalized(), room);
   int depth = 0;
-  for (const Crossing& crossing : crossings)
+  for (const Crossing& crossing : room.crossings)
     if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
   return std::max(depth, 1);
 }
 
 // Hits as crossings: distances from the true point, one for a ray through the edge of two faces, and where
 // bodies touch the next one entered before the last is left.
-void Interior::find_crossings(const Vec3& from, const Vec3& direction, const std::vector<Hit>& hits,
-                              std::vector<Crossing>& crossings) const {
+void Interior::find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const {
+  std::vector<Crossing>& crossings = room.crossings;
   crossings.clear();
   float last_reach = 0;  // within which distances are the same, for all that precision tells
-  for (const Hit& hit : hits) {
+  for (const Hit& hit : room.hits) {
     const SurfacePoint point = surface_point(world_, hit);
     const float side = point.side(direction);
     const float cosine = std::max(std::abs(dot(point.geometric_normal, direction)), 1e-3f);
     const float reach = (point.origin(side) - point.position).length() / cosine;
-    const Crossing crossing{distance_to_plane(from, direction, point), hit, side > 0};
+    const Crossing crossing{distance_to_plane(from, direction, point), hit, point, side > 0};
     const bool touches = !crossings.empty() && crossing.t - crossings.back().t <= std::max(reach, last_reach);
     last_reach = reach;
     if (touches && crossing.leaving == crossings.back().leaving &&
@@ -113,25 +107,24 @@ void Interior::find_crossings(const Vec3& from, const Vec3& direction, const std
   }
 }
 
-ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const {
+ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction,
+                                 InteriorRoom& room) const {
   ViewSegment segment;
   segment.begin = from.position;
   segment.direction = direction;
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
-  segment.depth = bodies_below(from, from.side(out));
-  std::vector<Hit> hits;
-  std::vector<Crossing> crossings;
-  if (!world_.tracer.collect({segment.first_origin, direction}, all_, hits)) return segment;
-  find_crossings(from.position, direction, hits, crossings);
+  segment.depth = bodies_below(from, from.side(out), room);
+  if (!world_.tracer.collect({segment.first_origin, direction}, all_, room.hits)) return segment;
+  find_crossings(from.position, direction, room);
   int depth = segment.depth;
-  for (const Crossing& crossing : crossings) {
+  for (const Crossing& crossing : room.crossings) {
     depth += crossing.leaving ? -1 : 1;
     if (world_.shape(crossing.hit).medium == medium_ && depth > 0) {
       segment.crossings.push_back(crossing);
       continue;
     }
     // Between surfaces closer than the offsets from them there is no inside to speak of.
-    segment.last_origin = surface_point(world_, crossing.hit).origin(crossing.leaving ? -1.0f : 1.0f);
+    segment.last_origin = crossing.point.origin(crossing.leaving ? -1.0f : 1.0f);
     segment.length = dot(segment.last_origin - segment.first_origin, direction) > 0 ? crossing.t : 0.0f;
     return segment;
   }
@@ -146,10 +139,7 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
                                    InteriorRoom& room) const {
   LightSegment segment;
   segment.direction = sample.direction;
-  const bool infinite = std::isinf(sample.distance);
-  const Ray ray = infinite ? Ray{point.origin, sample.direction}
-                           : Ray{point.origin, sample.point - point.origin, 0, kReach};
-  segment.blocked = !world_.tracer.collect(ray, passable_, room.hits);
+  segment.blocked = !world_.tracer.collect(ray_to_light(point.origin, sample), passable_, room.hits);
   if (segment.blocked) return segment;
   std::erase_if(room.hits, [&](const Hit& hit) {
     if (world_.shape(hit).medium == medium_) return false;
@@ -157,13 +147,13 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     return true;
   });
   if (is_black(segment.transmittance)) return segment;
-  find_crossings(point.position, sample.direction, room.hits, room.crossings);
+  find_crossings(point.position, sample.direction, room);
 
   LightSegment guess = segment;
   float open_since = 0;
   if (sum_spans(room.crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
     return segment;
-  if (!infinite && box_.intersects(sample.point)) {  // the light is inside
+  if (!std::isinf(sample.distance) && box_.intersects(sample.point)) {  // the light is inside
     segment.length += sample.distance - open_since;
     return segment;
   }
@@ -186,7 +176,7 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
       if (!crossing.leaving && overlap == Overlap::kCounted) ++depth;
       continue;
     }
-    const Vec3 normal = surface_point(world_, crossing.hit).normal_towards(direction);
+    const Vec3 normal = crossing.point.normal_towards(direction);
     if (crossing.leaving) {
       LightSegment piece;
       enter_through(normal, surface_albedo(world_, crossing.hit, true), direction, crossing.t - open_since,

@@ -12,6 +12,7 @@ namespace nacre {
 struct Crossing {
   float t;  // distance from where the way starts
   Hit hit;
+  SurfacePoint point;
   bool leaving;  // out of the body
 };
 
@@ -60,14 +61,15 @@ class Interior {
   Interior(const World& world, std::size_t medium);
 
   /// From a point of the surface, seen from the side of `out`, along the unit vector `direction` inwards.
-  ViewSegment trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction) const;
-  /// From a point to a light sample taken there. `room` is memory to work in.
+  /// `room` is memory to work in.
+  ViewSegment trace_view(const SurfacePoint& from, const Vec3& out, const Vec3& direction,
+                         InteriorRoom& room) const;
+  /// From a point to a light sample taken there.
   LightSegment trace_light(const InteriorPoint& point, const LightSample& sample, InteriorRoom& room) const;
 
  private:
-  int bodies_below(const SurfacePoint& at, float side) const;
-  void find_crossings(const Vec3& from, const Vec3& direction, const std::vector<Hit>& hits,
-                      std::vector<Crossing>& crossings) const;
+  int bodies_below(const SurfacePoint& at, float side, InteriorRoom& room) const;
+  void find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const;
   enum class Overlap { kCounted, kIgnored };
   bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
                  LightSegment& segment, float& open_since) const;

@@ -56,12 +56,6 @@ std::array<Axis, 3> probe_axes(const Vec3& normal) {
   return {{{frame.n, 0.5f}, {frame.s, 0.25f}, {frame.t, 0.25f}}};
 }
 
-std::vector<std::uint32_t> shapes_of(const Scene& scene, std::size_t medium) {
-  std::vector<std::uint32_t> indices;
-  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i)
-    if (scene.shapes[i].medium == static_cast<int>(medium)) indices.push_back(i);
-  return indices;
-}
 std::vector<const Mesh*> meshes_of(const Scene& scene, std::span<const std::uint32_t> shapes) {
   std::vector<const Mesh*> meshes;
   for (const std::uint32_t i : shapes) meshes.push_back(&scene.shapes[i].mesh);
@@ -89,7 +83,7 @@ struct MonteCarloDiffusion::Impl {
         bounces(bounce_count),
         eta(of_world.scene->media[medium].eta()),
         profiles(make_profiles(of_world.scene->media[medium])),
-        world_meshes(shapes_of(*of_world.scene, medium)),
+        world_meshes(shapes_of_medium(*of_world.scene, medium)),
         meshes(meshes_of(*of_world.scene, world_meshes)),
         tracer(meshes),
         density(of_world.scene->media[medium], std::max(double{tracer.bounds().size().length()}, 1e-30)) {

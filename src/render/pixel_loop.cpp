@@ -177,6 +177,7 @@ void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vect
     follow(branch, rays.reflected, layer, key, next);
     ++branch.branch;
     follow(branch, rays.transmitted, layer, key, next);
+    if (is_black(bsdf.diffuse)) return;
     bsdf.specular = false;
   }
   const int samples = path.scattered == 0 ? light_samples_ : 1;

@@ -129,13 +129,13 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
   Vec3 inward;
   float transmittance = 0;
   if (samples <= 0 || is_black(m.sigma_s) || !m.refract_view(point, out, inward, transmittance)) return sum;
-  const ViewSegment view = m.interior.trace_view(point, out, inward);
+  InteriorRoom room;
+  const ViewSegment view = m.interior.trace_view(point, out, inward, room);
   ++lost.taken;
   lost.lost += view.lost;
   const FreeFlight flight(m.sigma_t, view.length);
   if (!flight.possible()) return sum;
 
-  InteriorRoom room;
   for (int i = 0; i < samples; ++i) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
     const Vec3 u = sobol_3d(index, key);

@@ -2,7 +2,6 @@
 #include "render/translucency.h"
 
 #include "nacre/base/random.h"
-#include "nacre/optics/fresnel.h"
 #include "nacre/optics/profile.h"
 #include "nacre/transport/irradiance.h"
 
@@ -19,14 +18,12 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
     : world_(world),
       method_(world.scene->media[medium].lambert ? Method::kLambert : params.method),
       eta_(world.scene->media[medium].eta()),
+      exit_factor_(exit_factor(world.scene->media[medium])),
       bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
       light_samples_(world.scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
       mc_samples_(params.mc_samples) {
   const Medium& m = world.scene->media[medium];
-  const double transmittance =
-      m.convention == Convention::kConserving ? mean_transmittance(double{eta_}) : 1.0;
-  exit_factor_ = static_cast<float>(1 / (kPiD * transmittance));
   const auto profiles = make_profiles(m);
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_))
@@ -61,11 +58,8 @@ void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<R
       }
     }
   }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const float cos_o = std::min(dot(points[i].surface.normal_towards(points[i].out), points[i].out), 1.0f);
-    radiance[i] *= surface_albedo(world_, points[i].hit, false) *
-                   ((1 - fresnel_reflectance(cos_o, eta_)) * exit_factor_);
-  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    radiance[i] *= exit_transmittance(world_, points[i].hit, points[i].surface, points[i].out) * exit_factor_;
 }
 
 Rgb Translucency::lambert_exitance(const ExitPoint& point) const {

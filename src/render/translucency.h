@@ -42,8 +42,8 @@ class Translucency {
   const World& world_;
   Method method_;
   float eta_;
-  float exit_factor_;  // 1/pi, or 1/(pi T) to lose nothing at the exit
-  Rgb total_;          // of the profile
+  float exit_factor_;
+  Rgb total_;  // of the profile
   int bounces_, light_samples_, single_samples_, mc_samples_;
   std::optional<Exitance> exitance_;
   std::optional<MonteCarloDiffusion> monte_carlo_;

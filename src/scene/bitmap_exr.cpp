@@ -95,10 +95,7 @@ Bitmap decode_exr(const std::string& bytes, const std::string& path) {
   } catch (const std::bad_alloc&) {
     fail(ErrorCode::kLimit, path, "the picture does not fit into memory");
   } catch (const std::exception& error) {
-    // OpenEXR's reasons may run over two lines.
-    std::string reason = error.what();
-    std::ranges::replace(reason, '\n', ' ');
-    fail(ErrorCode::kSyntax, path, "truncated or damaged OpenEXR file: {}", reason);
+    fail_damaged_exr(path, error);
   }
 }
 

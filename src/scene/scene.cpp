@@ -23,6 +23,13 @@ bool is_environment(const Light& light) {
          std::holds_alternative<EnvironmentMap>(light.model);
 }
 
+std::vector<std::uint32_t> shapes_of_medium(const Scene& scene, std::size_t medium) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t i = 0; i < scene.shapes.size(); ++i)
+    if (scene.shapes[i].medium == static_cast<int>(medium)) indices.push_back(i);
+  return indices;
+}
+
 std::string light_name(const Scene& scene, std::size_t light) {
   const std::string& id = scene.lights[light].id;
   return id.empty() ? fmt::format("light {}", light + 1) : id;

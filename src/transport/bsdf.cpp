@@ -119,10 +119,6 @@ BsdfSample sample_continuous(const Bsdf& bsdf, const Configuration& c, Vec3 in, 
 
 }  // namespace
 
-Rgb boundary_reflectance(const Bsdf& bsdf, float cosine) noexcept {
-  return reflectance(bsdf, cosine, bsdf.eta);
-}
-
 Rgb eval_diffuse(const Bsdf& bsdf, float cos_i, float cos_o) noexcept {
   if (!bsdf.coated) return bsdf.diffuse / kPi;
   // Source: the plastic model of Mitsuba 0.6; in through the coat, any number of internal reflections, out

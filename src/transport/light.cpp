@@ -113,41 +113,35 @@ Rgb environment_radiance(const World& world, const Vec3& direction) noexcept {
 }
 
 Rgb pass_glass(const World& world, const Hit& hit, const Vec3& direction) noexcept {
-  const Bsdf& bsdf = world.bsdfs[hit.mesh];
-  if (!bsdf.transmits || bsdf.rough()) return {0, 0, 0};
+  if (!world.clear_glass[hit.mesh]) return {0, 0, 0};
+  const Bsdf bsdf = bsdf_at(world, hit);
   const SurfacePoint point = surface_point(world, hit);
   const float cosine = std::min(dot(point.normal_towards(direction), direction), 1.0f);
   // Straight through: the angle is that outside, on either side.
   const float reflectance = fresnel_reflectance(cosine, std::max(bsdf.eta, 1 / bsdf.eta));
-  return bsdf_at(world, hit).specular_transmittance * (1 - reflectance);
+  return bsdf.specular_transmittance * (1 - reflectance);
 }
 
-Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample) noexcept {
+Ray ray_to_light(const Vec3& origin, const LightSample& sample) noexcept {
+  // At the light's point from the origin itself, which may lie off the place that the sample was taken for,
+  // and ending short of it by more than rounding.
+  constexpr float kReach = 1 - 1e-4f;
+  if (std::isinf(sample.distance)) return {origin, sample.direction};
+  return {origin, sample.point - origin, 0, kReach};
+}
+
+Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample) {
   Visibility visibility;
   if (!world.shadows) return visibility;
-  // Aimed from the origin itself, which lies off the surface, at the light's point and ending short of it by
-  // more than rounding, so that the light's own surface does not count.
-  constexpr float kReach = 1 - 1e-4f;
-  const bool infinite = std::isinf(sample.distance);
-  Ray ray = infinite ? Ray{origin, sample.direction} : Ray{origin, sample.point - origin, 0, kReach};
-  if (world.tracer.occluded(ray, kBlockingMask)) {
-    visibility.transmittance = {0, 0, 0};
+  const Ray ray = ray_to_light(origin, sample);
+  if (!world.has_glass) {
+    if (world.tracer.occluded(ray)) visibility.transmittance = {0, 0, 0};
     return visibility;
   }
-  if (!world.has_glass) return visibility;
-  constexpr int kMostBoundaries = 256;
-  for (int n = 0; n < kMostBoundaries; ++n) {
-    const Hit hit = world.tracer.intersect(ray, kGlassMask);
-    if (!hit) return visibility;
-    visibility.transmittance *= pass_glass(world, hit, sample.direction);
-    visibility.through_glass = true;
-    const SurfacePoint point = surface_point(world, hit);
-    const Vec3 behind = point.origin(point.side(sample.direction));
-    if (is_black(visibility.transmittance) || !(dot(behind - ray.origin, sample.direction) > 0)) break;
-    ray.origin = behind;
-    if (!infinite) ray.direction = sample.point - behind;
-  }
-  visibility.transmittance = {0, 0, 0};
+  std::vector<Hit> boundaries;
+  if (!world.tracer.collect(ray, world.clear_glass, boundaries)) return {{0, 0, 0}};
+  for (const Hit& hit : boundaries) visibility.transmittance *= pass_glass(world, hit, sample.direction);
+  visibility.through_glass = !boundaries.empty();
   return visibility;
 }
 

@@ -9,10 +9,7 @@ double mean(const Rgb& c) {
 }
 
 Distribution triangles_by_area(const Mesh& mesh, const std::string& place) {
-  std::vector<double> areas(mesh.triangles.size());
-  for (std::size_t t = 0; t < areas.size(); ++t)
-    areas[t] = 0.5 * static_cast<double>(area_vector(mesh, t).length());
-  Distribution triangles(areas);
+  Distribution triangles(triangle_areas(mesh));
   if (!(triangles.total() > 0)) fail(ErrorCode::kValue, place, "this light's shape has no area; remove it");
   return triangles;
 }

@@ -106,24 +106,27 @@ float CoatTransmittance::eval(float mu) const noexcept {
 }
 
 Bsdf make_bsdf(const Surface* surface, const Medium* medium) {
-  Bsdf bsdf;
+  auto model = surface  ? surface->model
+               : medium ? decltype(surface->model)(DielectricSurface{})
+                        : decltype(surface->model)(DiffuseSurface{});
+  // The index of a boundary, and what passes it, are the medium's to answer for.
+  if (medium)
+    std::visit(
+        [&](auto& m) {
+          if constexpr (requires { m.int_ior; }) {
+            m.int_ior = medium->int_ior;
+            m.ext_ior = medium->ext_ior;
+          }
+        },
+        model);
+  Bsdf bsdf = std::visit([](const auto& m) { return from_model(m); }, model);
   if (surface) {
-    auto model = surface->model;
-    if (auto* plastic = std::get_if<PlasticSurface>(&model); plastic && medium) {
-      plastic->int_ior = medium->int_ior;
-      plastic->ext_ior = medium->ext_ior;
-    }
-    bsdf = std::visit([](const auto& m) { return from_model(m); }, model);
     bsdf.textures = surface->textures;
     bsdf.two_sided = surface->two_sided;
-  } else {
-    bsdf = medium ? from_model(DielectricSurface{}) : from_model(DiffuseSurface{});
   }
-  // What passes the boundary of a medium is the medium's to answer for, and so is the boundary's index.
   if (medium && bsdf.transmits) {
     bsdf.transmits = false;
     bsdf.two_sided = true;
-    bsdf.eta = medium->eta();
   }
   // Light passes facets between like indices straight on, whatever their normals, which then cannot be told
   // from the directions.

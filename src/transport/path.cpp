@@ -82,7 +82,7 @@ ScatterPoint scatter_point(const World& world, const Hit& hit, const Vec3& out) 
 }
 
 Rgb reflect_direct_light(const World& world, const ScatterPoint& at, int samples, std::uint64_t key,
-                         std::uint32_t first_sample, Continuation continuation) noexcept {
+                         std::uint32_t first_sample, Continuation continuation) {
   Rgb sum(0, 0, 0);
   const Bsdf& bsdf = at.surface.bsdf;
   if (is_black(bsdf.diffuse) && !(bsdf.specular && bsdf.rough())) return sum;

@@ -1,6 +1,8 @@
 // Surfaces in the world.
 #include "nacre/transport/surface.h"
 
+#include "nacre/optics/fresnel.h"
+
 namespace nacre {
 namespace {
 
@@ -53,6 +55,13 @@ Rgb surface_albedo(const World& world, const Hit& hit, bool entry) noexcept {
   for (int k = 0; k < 3; ++k)
     if (albedo[k] != 1) albedo[k] = std::pow(albedo[k], share);
   return albedo;
+}
+
+Rgb exit_transmittance(const World& world, const Hit& hit, const SurfacePoint& point,
+                       const Vec3& out) noexcept {
+  const Medium& medium = world.scene->media[static_cast<std::size_t>(world.shape(hit).medium)];
+  const float cosine = std::min(dot(point.normal_towards(out), out), 1.0f);
+  return surface_albedo(world, hit, false) * (1 - fresnel_reflectance(cosine, medium.eta()));
 }
 
 SurfaceBsdf surface_at(const World& world, const Hit& hit, const SurfacePoint& point,

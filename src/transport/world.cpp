@@ -6,21 +6,19 @@
 namespace nacre {
 
 World make_world(const Scene& scene, bool shadows) {
-  std::vector<Bsdf> bsdfs;
   std::vector<const Mesh*> meshes;
-  std::vector<std::uint32_t> masks;
-  bool has_glass = false;
+  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
+  World world{&scene, RayTracer(meshes), {}, make_light_table(scene), shadows, {}};
   for (const Shape& shape : scene.shapes) {
     const Bsdf bsdf =
         make_bsdf(shape.surface == kNone ? nullptr : &scene.surfaces[static_cast<std::size_t>(shape.surface)],
                   shape.medium == kNone ? nullptr : &scene.media[static_cast<std::size_t>(shape.medium)]);
     const bool glass = bsdf.transmits && !bsdf.rough();
-    has_glass = has_glass || glass;
-    bsdfs.push_back(bsdf);
-    meshes.push_back(&shape.mesh);
-    masks.push_back(glass ? kGlassMask : kBlockingMask);
+    world.clear_glass.push_back(glass);
+    world.has_glass = world.has_glass || glass;
+    world.bsdfs.push_back(bsdf);
   }
-  return {&scene, RayTracer(meshes, masks), std::move(bsdfs), make_light_table(scene), shadows, has_glass};
+  return world;
 }
 
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {

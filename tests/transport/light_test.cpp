@@ -1,11 +1,10 @@
 // label: analytic
 // Connections to lights integrate to what is known, and bounced light to closed forms.
-#include "nacre/transport/path.h"
-
 #include <gtest/gtest.h>
 
 #include "nacre/base/error.h"
 #include "nacre/base/random.h"
+#include "nacre/transport/path.h"
 #include "transport/scene_parts.h"
 
 namespace nacre {

@@ -30,6 +30,10 @@ struct Medium {
   float eta() const { return int_ior / ext_ior; }
 };
 
+/// From diffuse exitance to radiance, the Fresnel transmittance apart: 1/pi, or 1/(pi T) for a conserving
+/// medium, which loses nothing at the exit. By quadrature: not for inner loops.
+float exit_factor(const Medium& medium);
+
 /// What diffusion needs, in 1/mm. Source: Jensen et al. 2001.
 struct Reduced {
   Rgb sigma_s_prime, sigma_t_prime, alpha_prime, sigma_tr;

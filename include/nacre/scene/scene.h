@@ -182,6 +182,8 @@ struct Scene {
 /// Bounces of light off opaque surfaces before it enters a medium: `asked` for, else by the integrator unless
 /// the medium wants direct light only.
 int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int> asked);
+/// Indices of the shapes that a medium fills, in order.
+std::vector<std::uint32_t> shapes_of_medium(const Scene& scene, std::size_t medium);
 /// Name for messages: id or "light 2".
 std::string light_name(const Scene& scene, std::size_t light);
 std::string medium_name(const Scene& scene, std::size_t medium);

@@ -48,9 +48,6 @@ Bsdf make_bsdf(const Surface* surface, const Medium* medium);
 /// Diffuse part, per steradian, without the cosine, for light from and to the front side: cosines > 0.
 /// Reciprocal.
 Rgb eval_diffuse(const Bsdf& bsdf, float cos_i, float cos_o) noexcept;
-/// Reflectance of the smooth boundary, or of one microfacet, for light from the front at that cosine in
-/// [0, 1]; specular_reflectance included.
-Rgb boundary_reflectance(const Bsdf& bsdf, float cosine) noexcept;
 
 // What follows works in the local frame of the shading normal: +z is the front, `in` points to where light
 // comes from, `out` to where it goes; both are unit vectors that point away from the surface. f is for

@@ -46,7 +46,9 @@ struct Visibility {
 /// that surface. Clear glass, which is a smooth dielectric without a medium, lets light through straight on,
 /// less its Fresnel reflection at each boundary; everything else blocks it. Nothing does when the world has
 /// no shadows.
-Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample) noexcept;
+Visibility see_light(const World& world, const Vec3& origin, const LightSample& sample);
+/// From `origin` to the point of a light's sample, short of the light's own surface, or infinitely far.
+Ray ray_to_light(const Vec3& origin, const LightSample& sample) noexcept;
 /// Transmittance of a boundary of clear glass for a straight ray; black for any other surface.
 Rgb pass_glass(const World& world, const Hit& hit, const Vec3& direction) noexcept;
 

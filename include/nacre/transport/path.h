@@ -58,7 +58,7 @@ enum class Continuation { kEnds, kGoesOn };
 /// Radiance that a surface sends towards `out` of what arrives by `samples` connections to the lights
 /// (for_each_connection), mirrored and smoothly refracted light excepted.
 Rgb reflect_direct_light(const World& world, const ScatterPoint& at, int samples, std::uint64_t key,
-                         std::uint32_t first_sample, Continuation continuation) noexcept;
+                         std::uint32_t first_sample, Continuation continuation);
 
 /// A ray onwards, chosen by the bsdf, and its weight; black if there is none. `before` is the ray that came
 /// here.

@@ -14,6 +14,11 @@ Bsdf bsdf_at(const World& world, const Hit& hit) noexcept;
 /// u, v of the hit are used.
 Rgb surface_albedo(const World& world, const Hit& hit, bool entry) noexcept;
 
+/// Share of light from inside that leaves a translucent shape at `hit` towards `out` (unit): the Fresnel
+/// transmittance of its boundary, taken as smooth, times its albedo at the exit.
+Rgb exit_transmittance(const World& world, const Hit& hit, const SurfacePoint& point,
+                       const Vec3& out) noexcept;
+
 /// A bsdf placed in the world.
 struct SurfaceBsdf {
   Bsdf bsdf;

@@ -10,9 +10,6 @@
 
 namespace nacre {
 
-/// Masks of rays towards lights: what blocks them, and clear glass.
-inline constexpr std::uint32_t kBlockingMask = 1, kGlassMask = 2;
-
 /// Everything that tracing light needs. The scene has to outlive it unchanged.
 struct World {
   const Scene* scene;
@@ -20,7 +17,8 @@ struct World {
   std::vector<Bsdf> bsdfs;  // parallel to Scene::shapes
   LightTable lights;
   bool shadows = true;
-  bool has_glass = false;  // any shape that light passes straight through (see_light)
+  std::vector<std::uint8_t> clear_glass;  // by shape: whether light passes straight through (see_light)
+  bool has_glass = false;                 // any of them
 
   const Shape& shape(const Hit& hit) const { return scene->shapes[hit.mesh]; }
 };
