@@ -30,6 +30,16 @@ float distance_to_plane(const Vec3& position, const Vec3& direction, const Surfa
   return std::isfinite(t) ? std::max(t, 0.0f) : 0.0f;
 }
 
+// How much longer a way from a point with a lift is when both the point and the boundary at its end are where
+// the smooth surface would have them: without this, depths belong to the flat triangles and cosines to the
+// interpolated normals, and a coarse mesh shows its facets. One step onto the tangent plane at the boundary,
+// no longer than the triangle.
+float smoothing(const Vec3& lift, const Vec3& direction, const SurfacePoint& hit) {
+  const Vec3 normal = hit.normal_towards(direction);
+  const float longer = dot(hit.lift - lift, normal) / dot(direction, normal);
+  return std::clamp(longer, -hit.extent, hit.extent);
+}
+
 // Whether two triangles of one mesh meet at a vertex.
 bool share_vertex(const World& world, const Hit& a, const Hit& b) {
   if (a.mesh != b.mesh) return false;
@@ -44,7 +54,7 @@ bool share_vertex(const World& world, const Hit& a, const Hit& b) {
 
 InteriorPoint ViewSegment::at(float distance) const {
   InteriorPoint point{begin + direction * distance,
-                      first_origin + (last_origin - first_origin) * (distance / length), depth};
+                      first_origin + (last_origin - first_origin) * (distance / length), lift, depth};
   for (const Crossing& crossing : crossings)
     if (crossing.t < distance) point.depth += crossing.leaving ? -1 : 1;
   point.depth = std::max(point.depth, 1);
@@ -77,7 +87,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
   if (!several_bodies_) return 1;
   const Vec3 above = at.origin(side), below = at.origin(-side);
   if (!world_.tracer.collect({above, below - above, 0, 1}, all_, room.hits)) return 1;
-  find_crossings(above, (below - above).normalized(), room);
+  find_crossings(above, at.lift, (below - above).normalized(), room);
   int depth = 0;
   for (const Crossing& crossing : room.crossings)
     if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
@@ -86,7 +96,8 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
 
 // Hits as crossings: distances from the true point, one for a ray through the edge of two faces, and where
 // bodies touch the next one entered before the last is left.
-void Interior::find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const {
+void Interior::find_crossings(const Vec3& from, const Vec3& lift, const Vec3& direction,
+                              InteriorRoom& room) const {
   std::vector<Crossing>& crossings = room.crossings;
   crossings.clear();
   float last_reach = 0;  // within which distances are the same, for all that precision tells
@@ -95,7 +106,8 @@ void Interior::find_crossings(const Vec3& from, const Vec3& direction, InteriorR
     const float side = point.side(direction);
     const float cosine = std::max(std::abs(dot(point.geometric_normal, direction)), 1e-3f);
     const float reach = (point.origin(side) - point.position).length() / cosine;
-    const Crossing crossing{distance_to_plane(from, direction, point), hit, point, side > 0};
+    const float t = distance_to_plane(from, direction, point);
+    const Crossing crossing{t, std::max(t + smoothing(lift, direction, point), 0.0f), hit, point, side > 0};
     const bool touches = !crossings.empty() && crossing.t - crossings.back().t <= std::max(reach, last_reach);
     last_reach = reach;
     if (touches && crossing.leaving == crossings.back().leaving &&
@@ -112,10 +124,11 @@ ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, cons
   ViewSegment segment;
   segment.begin = from.position;
   segment.direction = direction;
+  segment.lift = from.lift;
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
   segment.depth = bodies_below(from, from.side(out), room);
   if (!world_.tracer.collect({segment.first_origin, direction}, all_, room.hits)) return segment;
-  find_crossings(from.position, direction, room);
+  find_crossings(from.position, from.lift, direction, room);
   int depth = segment.depth;
   for (const Crossing& crossing : room.crossings) {
     depth += crossing.leaving ? -1 : 1;
@@ -147,7 +160,7 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     return true;
   });
   if (is_black(segment.transmittance)) return segment;
-  find_crossings(point.position, sample.direction, room);
+  find_crossings(point.position, point.lift, sample.direction, room);
 
   LightSegment guess = segment;
   float open_since = 0;
@@ -179,8 +192,8 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
     const Vec3 normal = crossing.point.normal_towards(direction);
     if (crossing.leaving) {
       LightSegment piece;
-      enter_through(normal, surface_albedo(world_, crossing.hit, true), direction, crossing.t - open_since,
-                    piece);
+      enter_through(normal, surface_albedo(world_, crossing.hit, true), direction,
+                    crossing.smooth_t - open_since, piece);
       if (last_entry) {
         segment.direction = piece.direction;
         segment.cos_entry = piece.cos_entry;
@@ -192,7 +205,7 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
     } else {
       segment.transmittance *= surface_albedo(world_, crossing.hit, false) *
                                (1 - fresnel_reflectance(std::min(dot(normal, direction), 1.0f), eta_));
-      open_since = crossing.t;
+      open_since = crossing.smooth_t;
       depth = 1;
     }
   }

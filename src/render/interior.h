@@ -10,7 +10,8 @@ namespace nacre {
 
 /// A boundary on a straight way.
 struct Crossing {
-  float t;  // distance from where the way starts
+  float t;         // distance from where the way starts
+  float smooth_t;  // the same between the smooth surfaces that the meshes stand for
   Hit hit;
   SurfacePoint point;
   bool leaving;  // out of the body
@@ -20,6 +21,7 @@ struct Crossing {
 /// and for large triangles that much further from the first.
 struct InteriorPoint {
   Vec3 position, origin;
+  Vec3 lift;      // how much further up it is below the smooth surface that the mesh stands for
   int depth = 1;  // number of bodies of the medium that it is inside of
 };
 
@@ -27,6 +29,7 @@ struct InteriorPoint {
 /// object.
 struct ViewSegment {
   Vec3 begin, direction;           // on the surface; unit
+  Vec3 lift;                       // of its beginning
   Vec3 first_origin, last_origin;  // its ends, off the surfaces
   float length = 0;
   bool lost = false;                // no surface ended it; the bounding box did
@@ -69,7 +72,7 @@ class Interior {
 
  private:
   int bodies_below(const SurfacePoint& at, float side, InteriorRoom& room) const;
-  void find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const;
+  void find_crossings(const Vec3& from, const Vec3& lift, const Vec3& direction, InteriorRoom& room) const;
   enum class Overlap { kCounted, kIgnored };
   bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
                  LightSegment& segment, float& open_since) const;
