@@ -133,7 +133,7 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     total_weight += weights.back();
     const double spacing = params.spacing_mm ? *params.spacing_mm / medium.scale : kDefaultSpacing * length;
     group.points = 2 / std::sqrt(3.0) * group.surface_area / square(spacing);
-    if (!params.spacing_mm) group.points *= settings.sample_multiplier;
+    if (!params.spacing_mm) group.points = std::max(group.points, kFewestPoints) * settings.sample_multiplier;
     if (medium.lambert) group.points = 1;
     group.irradiance_samples = params.irradiance_samples.value_or(
         settings.irradiance_samples > 0 ? settings.irradiance_samples : kDefaultIrradianceSamples);

@@ -143,6 +143,13 @@ TEST(PlanBake, SamplesAndBouncesComeFromTheSceneUnlessGiven) {
   EXPECT_EQ(plan_bake(scene, params).groups[0].irradiance_samples, 5);
 }
 
+// A body far smaller than a mean free path still has a lit and a dark side.
+TEST(PlanBake, SmallBodiesGetEnoughSamplesToShadeThem) {
+  const BakePlan plan = plan_bake(marble_scene(1e-3f), {});
+  EXPECT_EQ(plan.groups[0].points, kFewestPoints);
+  EXPECT_GT(plan_bake(marble_scene(100), {}).groups[0].points, 10 * kFewestPoints);
+}
+
 TEST(PlanBake, EveryGroupGetsASample) {
   BakeParams params;
   params.points = 1;

@@ -24,6 +24,8 @@ struct BakeParams {
 };
 
 inline constexpr double kDefaultSpacing = 0.65;  // mean free paths
+inline constexpr double kFewestPoints =
+    1000;  // per medium by default: enough to tell its lit side from its dark one
 inline constexpr int kDefaultIrradianceSamples = 64;
 inline constexpr double kMostPoints = 200e6;
 
