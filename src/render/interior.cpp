@@ -30,14 +30,20 @@ float distance_to_plane(const Vec3& position, const Vec3& direction, const Surfa
   return std::isfinite(t) ? std::max(t, 0.0f) : 0.0f;
 }
 
-// How much longer a way from a point with a lift is when both the point and the boundary at its end are where
-// the smooth surface would have them: without this, depths belong to the flat triangles and cosines to the
-// interpolated normals, and a coarse mesh shows its facets. One step onto the tangent plane at the boundary,
-// no longer than the triangle.
-float smoothing(const Vec3& lift, const Vec3& direction, const SurfacePoint& hit) {
+// How much longer a way of length `t` is when both the point below `top` and the boundary at its end are
+// where the smooth surface would have them: without this, depths belong to the flat triangles and cosines to
+// the interpolated normals, and a coarse mesh shows its facets. One step onto the tangent plane at the
+// boundary. It is for ways that come out on the sheet of surface that they began under; across to the other
+// side the mesh itself is the better judge of how thick a body is (normals round the edges of a box make it a
+// ball).
+float smoothing(const SheetPoint& top, const Vec3& direction, float t, const SurfacePoint& hit) {
+  constexpr float kSameSheet = 0.5f;  // cosine between normals up to which triangles are one sheet
+  constexpr float kShortest = -0.75f, kLongest = 3;  // in lengths of the way
+  const float same = std::clamp(dot(top.plane, hit.geometric_normal) * (1 / kSameSheet), 0.0f, 1.0f);
+  if (same == 0) return 0;
   const Vec3 normal = hit.normal_towards(direction);
-  const float longer = dot(hit.lift - lift, normal) / dot(direction, normal);
-  return std::clamp(longer, -hit.extent, hit.extent);
+  const float longer = dot(hit.lift - top.lift, normal) / dot(direction, normal);
+  return same * std::clamp(longer, kShortest * t, kLongest * t);
 }
 
 // Whether two triangles of one mesh meet at a vertex.
@@ -54,7 +60,7 @@ bool share_vertex(const World& world, const Hit& a, const Hit& b) {
 
 InteriorPoint ViewSegment::at(float distance) const {
   InteriorPoint point{begin + direction * distance,
-                      first_origin + (last_origin - first_origin) * (distance / length), lift, depth};
+                      first_origin + (last_origin - first_origin) * (distance / length), top, depth};
   for (const Crossing& crossing : crossings)
     if (crossing.t < distance) point.depth += crossing.leaving ? -1 : 1;
   point.depth = std::max(point.depth, 1);
@@ -87,7 +93,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
   if (!several_bodies_) return 1;
   const Vec3 above = at.origin(side), below = at.origin(-side);
   if (!world_.tracer.collect({above, below - above, 0, 1}, all_, room.hits)) return 1;
-  find_crossings(above, at.lift, (below - above).normalized(), room);
+  find_crossings(above, {at.lift, at.geometric_normal}, (below - above).normalized(), room);
   int depth = 0;
   for (const Crossing& crossing : room.crossings)
     if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
@@ -96,7 +102,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
 
 // Hits as crossings: distances from the true point, one for a ray through the edge of two faces, and where
 // bodies touch the next one entered before the last is left.
-void Interior::find_crossings(const Vec3& from, const Vec3& lift, const Vec3& direction,
+void Interior::find_crossings(const Vec3& from, const SheetPoint& top, const Vec3& direction,
                               InteriorRoom& room) const {
   std::vector<Crossing>& crossings = room.crossings;
   crossings.clear();
@@ -107,7 +113,7 @@ void Interior::find_crossings(const Vec3& from, const Vec3& lift, const Vec3& di
     const float cosine = std::max(std::abs(dot(point.geometric_normal, direction)), 1e-3f);
     const float reach = (point.origin(side) - point.position).length() / cosine;
     const float t = distance_to_plane(from, direction, point);
-    const Crossing crossing{t, std::max(t + smoothing(lift, direction, point), 0.0f), hit, point, side > 0};
+    const Crossing crossing{t, t + smoothing(top, direction, t, point), hit, point, side > 0};
     const bool touches = !crossings.empty() && crossing.t - crossings.back().t <= std::max(reach, last_reach);
     last_reach = reach;
     if (touches && crossing.leaving == crossings.back().leaving &&
@@ -124,11 +130,11 @@ ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, cons
   ViewSegment segment;
   segment.begin = from.position;
   segment.direction = direction;
-  segment.lift = from.lift;
+  segment.top = {from.lift, from.geometric_normal};
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
   segment.depth = bodies_below(from, from.side(out), room);
   if (!world_.tracer.collect({segment.first_origin, direction}, all_, room.hits)) return segment;
-  find_crossings(from.position, from.lift, direction, room);
+  find_crossings(from.position, segment.top, direction, room);
   int depth = segment.depth;
   for (const Crossing& crossing : room.crossings) {
     depth += crossing.leaving ? -1 : 1;
@@ -160,7 +166,7 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     return true;
   });
   if (is_black(segment.transmittance)) return segment;
-  find_crossings(point.position, point.lift, sample.direction, room);
+  find_crossings(point.position, point.top, sample.direction, room);
 
   LightSegment guess = segment;
   float open_since = 0;

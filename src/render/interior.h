@@ -17,19 +17,24 @@ struct Crossing {
   bool leaving;  // out of the body
 };
 
+/// A sheet of surface at the point where the eye's ray enters: SurfacePoint::lift and geometric_normal.
+struct SheetPoint {
+  Vec3 lift, plane;
+};
+
 /// A point inside: where it is, and where rays from it start, which is off all surfaces by more than rounding
 /// and for large triangles that much further from the first.
 struct InteriorPoint {
   Vec3 position, origin;
-  Vec3 lift;      // how much further up it is below the smooth surface that the mesh stands for
-  int depth = 1;  // number of bodies of the medium that it is inside of
+  SheetPoint top;  // that the point is below
+  int depth = 1;   // number of bodies of the medium that it is inside of
 };
 
 /// The way from the point where the eye's ray enters to where it first leaves the medium or meets another
 /// object.
 struct ViewSegment {
   Vec3 begin, direction;           // on the surface; unit
-  Vec3 lift;                       // of its beginning
+  SheetPoint top;                  // at its beginning
   Vec3 first_origin, last_origin;  // its ends, off the surfaces
   float length = 0;
   bool lost = false;                // no surface ended it; the bounding box did
@@ -72,7 +77,8 @@ class Interior {
 
  private:
   int bodies_below(const SurfacePoint& at, float side, InteriorRoom& room) const;
-  void find_crossings(const Vec3& from, const Vec3& lift, const Vec3& direction, InteriorRoom& room) const;
+  void find_crossings(const Vec3& from, const SheetPoint& top, const Vec3& direction,
+                      InteriorRoom& room) const;
   enum class Overlap { kCounted, kIgnored };
   bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
                  LightSegment& segment, float& open_since) const;

@@ -63,6 +63,34 @@ TEST(CoarseMesh, LooksAsSmoothAsItsNormals) {
     }
 }
 
+// Normals that go round the edges of a plate, as a mesh without any gets them, make no ball of it: light from
+// behind passes its real thickness.
+TEST(CoarseMesh, StaysAsThinAsItIs) {
+  const auto mean = [](bool smooth) {
+    Scene scene;
+    Medium medium = make_test_medium();
+    medium.scale = 5;
+    Mesh plate = placed(make_cube(), {1, 1, 0.1f}, {0, 0, 0});
+    if (smooth) {
+      compute_normals(plate, 180);
+      EXPECT_LT(plate.normals[0].z, 0.9f);
+    }
+    add_shape(scene, std::move(plate), kNone, add_medium(scene, medium));
+    add_directional_light(scene, {0.1f, 0.2f, 1}, {1, 1, 1});
+    const World world = make_world(scene, true);
+    const SingleScattering single(world, 0);
+    LostSamples lost;
+    double sum = 0;
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      const Vec2 u = sobol_2d(i, 1);
+      const SurfacePoint point = point_at(world, {1.6f * u.x - 0.8f, 1.6f * u.y - 0.8f, 3}, {0, 0, -1});
+      sum += double{single.estimate(point, {0, 0, 1}, 64, 2, 0, lost).x} / 256;
+    }
+    return sum;
+  };
+  EXPECT_NEAR(mean(true) / mean(false), 1, 0.2);
+}
+
 TEST(OtherObjects, CastFullShadowsUnlessShadowsAreOff) {
   Scene scene;
   add_shape(scene, placed(make_sphere(), 4, {0, 0, 0}), kNone, add_medium(scene, make_test_medium()));
