@@ -174,23 +174,6 @@ Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept {
   return Vec3(a + (b - a) * double{hit.u} + (c - a) * double{hit.v});
 }
 
-float smooth_surface_height(const Mesh& mesh, const Hit& hit) noexcept {
-  if (mesh.normals.empty()) return 0;
-  constexpr float kSteepest = 0.2f;  // cosine of the greatest tilt believed of a vertex's normal
-  const Triangle& t = mesh.triangles[hit.triangle];
-  const std::array<float, 3> weights{1 - hit.u - hit.v, hit.u, hit.v};
-  const Vec3 plane = face_normal(mesh, hit.triangle), position = hit_position(mesh, hit);
-  const float side = dot(shading_normal(mesh, hit), plane) < 0 ? -1.0f : 1.0f;
-  // By the trapezoid rule from each vertex, the mean of which the slopes at the hit itself drop out of.
-  float height = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3 normal = mesh.normals[t[i]] * side;
-    height +=
-        weights[i] * dot(normal, mesh.positions[t[i]] - position) / std::max(dot(normal, plane), kSteepest);
-  }
-  return height / 2;
-}
-
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept {
   if (mesh.normals.empty()) return face_normal(mesh, hit.triangle);
   const Triangle& t = mesh.triangles[hit.triangle];

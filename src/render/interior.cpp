@@ -30,20 +30,39 @@ float distance_to_plane(const Vec3& position, const Vec3& direction, const Surfa
   return std::isfinite(t) ? std::max(t, 0.0f) : 0.0f;
 }
 
-// How much longer a way of length `t` is when both the point below `top` and the boundary at its end are
-// where the smooth surface would have them: without this, depths belong to the flat triangles and cosines to
-// the interpolated normals, and a coarse mesh shows its facets. One step onto the tangent plane at the
-// boundary. It is for ways that come out on the sheet of surface that they began under; across to the other
-// side the mesh itself is the better judge of how thick a body is (normals round the edges of a box make it a
-// ball).
+// Sine of the angle between shading normal and triangle.
+float tilt(const SurfacePoint& point) {
+  return std::sqrt(std::max(1 - square(dot(point.shading_normal, point.geometric_normal)), 0.0f));
+}
+
+// How much longer a way of length `t` to a hit is on the smooth surface that interpolated normals belong to.
+// Without this, depths belong to flat triangles and cosines to the normals, and a coarse mesh shows its
+// facets. The chord between two points of a smooth surface is square to the mean of their normals (of a
+// sphere exactly), so the way ends on the plane through `top` that the mean normal gives, as far as the tilt
+// of the normals against the triangles accounts for it. That is for ways that come out near where they began,
+// on the same sheet of surface; further on, and across to the other side, the mesh itself is the better judge
+// of how thick a body is (normals round the edges of a box make it a ball).
 float smoothing(const SheetPoint& top, const Vec3& direction, float t, const SurfacePoint& hit) {
-  constexpr float kSameSheet = 0.5f;  // cosine between normals up to which triangles are one sheet
+  constexpr float kSameSheet = 0.5f;    // cosine between normals from which on they share a sheet
+  constexpr float kNear = 2, kFar = 4;  // in triangles
   constexpr float kShortest = -0.75f, kLongest = 3;  // in lengths of the way
-  const float same = std::clamp(dot(top.plane, hit.geometric_normal) * (1 / kSameSheet), 0.0f, 1.0f);
-  if (same == 0) return 0;
-  const Vec3 normal = hit.normal_towards(direction);
-  const float longer = dot(hit.lift - top.lift, normal) / dot(direction, normal);
-  return same * std::clamp(longer, kShortest * t, kLongest * t);
+  const Vec3 chord = top.position - hit.position;
+  const float length = chord.length();
+  const float same = dot(top.normal, hit.shading_normal) / kSameSheet;
+  const float near = (kFar - length / std::max(top.extent, hit.extent)) / (kFar - kNear);
+  const float weight = std::clamp(same, 0.0f, 1.0f) * std::clamp(near, 0.0f, 1.0f);
+  const float most = 0.75f * (top.tilt + tilt(hit)) * length;
+  if (!(weight * most > 0)) return 0;
+  // How far the smooth surface is above the hit, and one step from there onto its tangent plane.
+  const Vec3 mean = (top.normal + hit.shading_normal).normalized();
+  const float height = std::clamp(dot(chord, mean), -most, most) / dot(hit.shading_normal, mean);
+  const float longer = height * dot(hit.shading_normal, hit.normal_towards(direction)) /
+                       dot(direction, hit.normal_towards(direction));
+  return weight * std::clamp(longer, kShortest * t, kLongest * t);
+}
+
+SheetPoint sheet_at(const SurfacePoint& point) {
+  return {point.position, point.shading_normal, point.extent, tilt(point)};
 }
 
 // Whether two triangles of one mesh meet at a vertex.
@@ -93,7 +112,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
   if (!several_bodies_) return 1;
   const Vec3 above = at.origin(side), below = at.origin(-side);
   if (!world_.tracer.collect({above, below - above, 0, 1}, all_, room.hits)) return 1;
-  find_crossings(above, {at.lift, at.geometric_normal}, (below - above).normalized(), room);
+  find_crossings(above, sheet_at(at), (below - above).normalized(), room);
   int depth = 0;
   for (const Crossing& crossing : room.crossings)
     if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
@@ -130,7 +149,7 @@ ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, cons
   ViewSegment segment;
   segment.begin = from.position;
   segment.direction = direction;
-  segment.top = {from.lift, from.geometric_normal};
+  segment.top = sheet_at(from);
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
   segment.depth = bodies_below(from, from.side(out), room);
   if (!world_.tracer.collect({segment.first_origin, direction}, all_, room.hits)) return segment;

@@ -17,9 +17,10 @@ struct Crossing {
   bool leaving;  // out of the body
 };
 
-/// A sheet of surface at the point where the eye's ray enters: SurfacePoint::lift and geometric_normal.
+/// The surface where the eye's ray enters: of its SurfacePoint, with the shading normal.
 struct SheetPoint {
-  Vec3 lift, plane;
+  Vec3 position, normal;
+  float extent, tilt;  // of the triangle; sine of the angle between it and the shading normal
 };
 
 /// A point inside: where it is, and where rays from it start, which is off all surfaces by more than rounding

@@ -24,8 +24,7 @@ World make_world(const Scene& scene, bool shadows) {
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {
   const Mesh& mesh = world.shape(hit).mesh;
   SurfacePoint point{hit_position(mesh, hit), face_normal(mesh, hit.triangle),
-                     triangle_extent(mesh, hit.triangle), shading_normal(mesh, hit), {}};
-  point.lift = point.geometric_normal * smooth_surface_height(mesh, hit);
+                     triangle_extent(mesh, hit.triangle), shading_normal(mesh, hit)};
   if (dot(point.shading_normal, point.geometric_normal) < 0) point.shading_normal = -point.shading_normal;
   return point;
 }

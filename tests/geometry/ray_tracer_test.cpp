@@ -266,32 +266,6 @@ TEST(RayTracer, ThreadsAgree) {
   }
 }
 
-TEST(SmoothSurfaceHeight, IsExactForQuadratics) {
-  // Every quadratic that is 0 at three corners: round, hollow, and some of each.
-  for (const auto& [a, b, c] :
-       {Vec3(0.1f, 0.2f, 0.1f), Vec3(-0.2f, -0.4f, -0.1f), Vec3(0.3f, -0.2f, 0.05f)}) {
-    const auto height = [&](float x, float y) { return a * x * y + (b * x + c * y) * (1 - x - y); };
-    Mesh mesh;
-    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    mesh.triangles = {{0, 1, 2}};
-    for (const Vec3& p : mesh.positions) {
-      const float slope_x = a * p.y + b * (1 - 2 * p.x - p.y) - c * p.y;
-      const float slope_y = a * p.x - b * p.x + c * (1 - p.x - 2 * p.y);
-      mesh.normals.push_back(Vec3(-slope_x, -slope_y, 1).normalized());
-    }
-    for (int n = 0; n < 50; ++n) {
-      const Vec2 uv = sobol_2d(static_cast<std::uint32_t>(n), 5);
-      const Hit hit{.t = 1, .mesh = 0, .triangle = 0, .u = uv.x * (1 - uv.y), .v = uv.y};
-      EXPECT_NEAR(smooth_surface_height(mesh, hit), height(hit.u, hit.v), 1e-6);
-      Mesh inside_out = mesh;
-      for (Vec3& normal : inside_out.normals) normal = -normal;
-      EXPECT_EQ(smooth_surface_height(inside_out, hit), smooth_surface_height(mesh, hit));
-    }
-    mesh.normals.clear();
-    EXPECT_EQ(smooth_surface_height(mesh, {.t = 1, .mesh = 0, .triangle = 0, .u = 0.3f, .v = 0.3f}), 0);
-  }
-}
-
 TEST(Collect, FindsEveryTriangleOnceInOrder) {
   // Sheets at random heights, some of them at the same one, each of two meshes.
   Mesh sheets[2];

@@ -142,7 +142,7 @@ TEST(SurfaceAt, MirrorsHaveNoDarkRims) {
 TEST(NormalTowards, IsSeenAndMirrorsAboveThePlane) {
   int bent = 0;
   for (std::uint32_t n = 0; n < 20000; ++n) {
-    SurfacePoint point{{0, 0, 0}, {0, 0, 1}, 1, sample_uniform_sphere(sobol_2d(n, 1)), {}};
+    SurfacePoint point{{0, 0, 0}, {0, 0, 1}, 1, sample_uniform_sphere(sobol_2d(n, 1))};
     if (point.shading_normal.z < 0) point.shading_normal = -point.shading_normal;
     const Vec3 out = sample_uniform_sphere(sobol_2d(n, 2));
     if (std::abs(out.z) < 1e-3f) continue;

@@ -57,11 +57,6 @@ class RayTracer {
 /// The point of a hit from the triangle's own vertices, in double precision and then rounded: within half an
 /// ulp of the triangle's plane in every coordinate, unlike origin + t * direction.
 Vec3 hit_position(const Mesh& mesh, const Hit& hit) noexcept;
-/// How far above a hit, along the face normal, the smooth surface lies that has the vertices and normals of
-/// the triangle: exact where that surface is a quadratic height field over the triangle, 0 at vertices and
-/// where the normals are the face's own, negative where the surface is hollow.
-float smooth_surface_height(const Mesh& mesh, const Hit& hit) noexcept;
-
 /// Interpolated unit normal of a hit; the face normal where the mesh has no normals.
 Vec3 shading_normal(const Mesh& mesh, const Hit& hit) noexcept;
 

@@ -32,7 +32,6 @@ struct SurfacePoint {
   Vec3 geometric_normal;  // unit, of the triangle's front side
   float extent;           // of the triangle, for offset_from_surface
   Vec3 shading_normal;    // unit, interpolated, on the same side as geometric_normal
-  Vec3 lift;              // to the smooth surface that the triangle stands for: see smooth_surface_height
 
   /// Where a ray that leaves to the front (side 1) or the back (side -1) starts.
   Vec3 origin(float side) const noexcept {
