@@ -264,9 +264,10 @@ void run(const Options& options, const std::string& command_line) {
   const Cache cache = make_cache(options, params[0], world, bake_params, session);
   if (cached) session.warn(check_density(scene, cache));
 
+  const Renderer renderer(world, cache, params[0], session.report());
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Warnings warnings;
-    Image image = render(world, cache, params[i], session.progress(), session.report(), warnings);
+    Image image = renderer.render(params[i], session.progress(), session.report(), warnings);
     if (pictures.size() > 1)
       for (std::string& warning : warnings)
         warning += fmt::format(" (camera {})", scene.cameras[params[i].camera].id);

@@ -31,6 +31,10 @@ const std::array<float, kDiscCells + 1>& disc_table() {
   return table;
 }
 
+struct JetValues {
+  double radial, bend;
+};
+
 float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 }  // namespace
@@ -78,7 +82,7 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
   const std::size_t bound_count = (static_cast<std::size_t>(last - first) + 1) << kBoundBits;
   bounds_.resize(bound_count + 2);
   for (std::size_t k = 0; k < 3; ++k) {
-    double hessian = 0, slope = 0;
+    double hessian = 0, slope = 0, third = 0;
     for (std::size_t i = bound_count + 1; i-- > 0;) {
       const auto near_bits = static_cast<std::uint32_t>((first_bound_ + i) << (23 - kBoundBits));
       const double low = i == 0 ? 0 : std::sqrt(static_cast<double>(r2_of_bits(near_bits)));
@@ -88,9 +92,37 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
         const ProfileValue v = eval_profile_derivatives(profiles[k], r);
         hessian = std::max({hessian, 1.02 * std::abs(v.curvature), 1.02 * std::abs(v.slope) / r});
         slope = std::max(slope, 1.02 * std::abs(v.slope));
+        // Along the radius by differences; of c s^2, that of an angle, the most is 2 / sqrt(27).
+        const double h = 1e-3 * r;
+        const double along = (eval_profile_derivatives(profiles[k], r + h).curvature -
+                              eval_profile_derivatives(profiles[k], r - h).curvature) /
+                             (2 * h);
+        const double across = (v.curvature - v.slope / r) / r;
+        third = std::max(third, 1.05 * (std::abs(along) + 2 / std::sqrt(3.0) * std::abs(across)));
       }
       bounds_[i].hessian[k] = static_cast<float>(std::min(hessian, 1e30));
+      bounds_[i].third[k] = static_cast<float>(std::min(third, 1e30));
       bounds_[i].slope[k] = static_cast<float>(std::min(slope, 1e30));
+    }
+  }
+
+  first_jet_ = (first << kJetBits) - 1;
+  jets_.resize(((static_cast<std::size_t>(last - first) + 1) << kJetBits) + 2);
+  for (std::size_t k = 0; k < 3; ++k) {
+    JetValues previous{0, 0};
+    for (std::size_t i = 0; i + 1 < jets_.size(); ++i) {
+      // The cell before the table's start holds what is there.
+      const auto far_bits = static_cast<std::uint32_t>((first_jet_ + i + 1) << (23 - kJetBits));
+      const double r = std::sqrt(static_cast<double>(r2_of_bits(far_bits)));
+      const ProfileValue v = eval_profile_derivatives(profiles[k], r);
+      const JetValues next{std::clamp(v.slope / r, -1e30, 1e30),
+                           std::clamp((v.curvature - v.slope / r) / square(r), -1e30, 1e30)};
+      if (i == 0) previous = next;
+      jets_[i].radial[k] = static_cast<float>(previous.radial);
+      jets_[i].radial_delta[k] = static_cast<float>(next.radial - previous.radial);
+      jets_[i].bend[k] = static_cast<float>(previous.bend);
+      jets_[i].bend_delta[k] = static_cast<float>(next.bend - previous.bend);
+      previous = next;
     }
   }
 }

@@ -3,21 +3,12 @@
 
 #include <numeric>
 
+#include "cache/morton.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 
 namespace nacre {
 namespace {
-
-// Spreads 21 bits so that two zero bits follow each.
-std::uint64_t spread_bits(std::uint64_t x) {
-  x &= 0x1fffff;
-  x = (x | x << 32) & 0x1f00000000ffffull;
-  x = (x | x << 16) & 0x1f0000ff0000ffull;
-  x = (x | x << 8) & 0x100f00f00f00f00full;
-  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-  return (x | x << 2) & 0x1249249249249249ull;
-}
 
 struct Keyed {
   std::uint64_t code;

@@ -35,18 +35,17 @@ class StageClock {
 
 }  // namespace
 
-PixelLoop::PixelLoop(const World& world, const Cache& cache, const RenderParams& params)
+PixelLoop::PixelLoop(const World& world, const std::vector<Translucency>& media, const RenderParams& params)
     : world_(world),
       params_(params),
       camera_(world.scene->cameras[params.camera], params.width, params.height),
       filter_(world.scene->films[params.camera]),
-      light_samples_(world.scene->integrator.emitter_samples) {
+      light_samples_(world.scene->integrator.emitter_samples),
+      media_(media) {
   const Integrator& integrator = world.scene->integrator;
   counts_mirrors_ = integrator.kind == IntegratorKind::kPath;
   depth_limit_ = !counts_mirrors_ ? 2 : integrator.max_depth < 0 ? kMaxWaves : integrator.max_depth;
   wave_limit_ = counts_mirrors_ ? std::min(depth_limit_, kMaxWaves) : kMaxDirectWaves;
-  for (std::size_t m = 0; m < world.scene->media.size(); ++m)
-    media_.emplace_back(world, m, m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
 }
 
 void PixelLoop::render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const {

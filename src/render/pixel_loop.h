@@ -22,8 +22,8 @@ struct Totals {
 
 class PixelLoop {
  public:
-  /// World, cache and parameters have to outlive it.
-  PixelLoop(const World& world, const Cache& cache, const RenderParams& params);
+  /// `media` are parallel to Scene::media. All have to outlive it.
+  PixelLoop(const World& world, const std::vector<Translucency>& media, const RenderParams& params);
   /// Adds the samples of pixels [begin, end) of the rendered rectangle, row by row.
   void render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const;
 
@@ -56,8 +56,8 @@ class PixelLoop {
   FilterSampler filter_;
   int light_samples_;
   int depth_limit_, wave_limit_;
-  bool counts_mirrors_;              // whether mirrored and refracted edges count towards the limit
-  std::vector<Translucency> media_;  // parallel to Scene::media
+  bool counts_mirrors_;  // whether mirrored and refracted edges count towards the limit
+  const std::vector<Translucency>& media_;
 };
 
 }  // namespace nacre

@@ -34,15 +34,25 @@ RenderParams default_render_params(const Scene& scene, std::size_t camera) {
   return params;
 }
 
+Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report)
+    : world_(world) {
+  const StageTimer timer(report, "diffusion");  // tables of profiles, nodes on surfaces
+  for (std::size_t m = 0; m < world.scene->media.size(); ++m)
+    media_.emplace_back(world, m, m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
+}
+Renderer::~Renderer() = default;
+
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,
              Report& report, Warnings& warnings) {
+  return Renderer(world, cache, params, report).render(params, progress, report, warnings);
+}
+
+Image Renderer::render(const RenderParams& params, Progress& progress, Report& report,
+                       Warnings& warnings) const {
   PixelBuffer pixels(params.crop_width, params.crop_height);
-  Totals totals(world.scene->media.size());
-  Stopwatch watch;
-  Stopwatch setup;
-  const PixelLoop loop(world, cache, params);
-  const double setup_seconds = setup.seconds();  // tabulated profiles
-  report.seconds["diffusion"] += setup_seconds;
+  Totals totals(media_.size());
+  const Stopwatch watch;
+  const PixelLoop loop(world_, media_, params);
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
   const std::size_t per_task =
@@ -60,7 +70,7 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
 
   // Stages are sums over threads; what the threads spent between them (waiting for the last row) is shared
   // out alike.
-  const double loop_seconds = watch.seconds() - setup_seconds;
+  const double loop_seconds = watch.seconds();
   const double busy = totals.primary + totals.diffusion + totals.single + totals.surface;
   const double share = busy > 0 ? loop_seconds / busy : 0;
   report.seconds["primary_rays"] += totals.primary * share;
@@ -71,7 +81,7 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
   report.counts["rays"] += totals.rays;
   report.counts["shading_points"] += totals.shading_points;
   report.counts["kernel_evaluations"] += totals.evaluations;
-  for (std::string& warning : describe_lost_samples(*world.scene, totals))
+  for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
   return pixels.make_image(params);
 }

@@ -16,6 +16,7 @@ enum Purpose : std::uint64_t { kMonteCarloPoints = 11, kLambertLight, kSinglePoi
 Translucency::Translucency(const World& world, std::size_t medium, const CacheGroup* group,
                            const RenderParams& params)
     : world_(world),
+      medium_(medium),
       method_(world.scene->media[medium].lambert ? Method::kLambert : params.method),
       eta_(world.scene->media[medium].eta()),
       exit_factor_(exit_factor(world.scene->media[medium])),
@@ -26,18 +27,37 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
   const Medium& m = world.scene->media[medium];
   const auto profiles = make_profiles(m);
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
-  if (uses_cache(method_))
-    exitance_.emplace(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
-  else if (method_ == Method::kMonteCarlo)
+  if (uses_cache(method_)) {
+    exitance_ = std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
+    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field();
+  } else if (method_ == Method::kMonteCarlo)
     monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
   if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
     single_.emplace(world, medium);
 }
 
+// Where R_d has no bound, M_o has detail at every sample; and where a body has so many mean free paths that
+// nodes would fill the memory, pixels are fewer.
+void Translucency::make_field() {
+  const Medium& m = world_.scene->media[medium_];
+  if (m.profile == ProfileKind::kNormalized) return;
+  std::vector<const Mesh*> meshes;
+  for (const Shape& shape : world_.scene->shapes)
+    meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
+  const double distance = ExitanceField::kNodeDistance * double{smallest_mean_free_path(m)} / double{m.scale};
+  if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
+    field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
+}
+
 void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
                                   std::uint64_t& evaluations) const {
-  if (exitance_) {
+  if (field_) {
+    std::vector<Hit> hits;
+    hits.reserve(points.size());
+    for (const ExitPoint& point : points) hits.push_back(point.hit);
+    field_->eval(hits, radiance, evaluations);
+  } else if (exitance_) {
     std::vector<Vec3> positions;
     positions.reserve(points.size());
     for (const ExitPoint& point : points) positions.push_back(point.surface.position);

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <array>
-#include <atomic>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "nacre/cache/exitance.h"
+#include "nacre/cache/exitance_field.h"
 #include "nacre/render/monte_carlo.h"
 #include "nacre/render/render.h"
 #include "nacre/render/single_scattering.h"
@@ -37,15 +38,18 @@ class Translucency {
   Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
 
  private:
+  void make_field();
   Rgb lambert_exitance(const ExitPoint& point) const;
 
   const World& world_;
+  std::size_t medium_;
   Method method_;
   float eta_;
   float exit_factor_;
   Rgb total_;  // of the profile
   int bounces_, light_samples_, single_samples_, mc_samples_;
-  std::optional<Exitance> exitance_;
+  std::unique_ptr<const Exitance> exitance_;
+  std::unique_ptr<const ExitanceField> field_;
   std::optional<MonteCarloDiffusion> monte_carlo_;
   std::optional<SingleScattering> single_;
 };

@@ -47,7 +47,7 @@ TEST(Bunny, DefaultToleranceIsWithinOnePercentOfExact) {
   EXPECT_GT(cache.groups[0].size(), 50000u);
 
   RenderParams params = default_render_params(scene, 0);
-  params.width = params.height = params.crop_width = params.crop_height = 80;
+  params.width = params.height = params.crop_width = params.crop_height = 120;
   params.samples_per_pixel = 1;
   const Image fast = render(world, cache, params, progress, report, warnings);
   const std::uint64_t evaluations = report.counts["kernel_evaluations"];

@@ -20,35 +20,49 @@ class Exitance {
   /// sums every sample.
   Exitance(const CacheGroup& group, const Medium& medium, double tolerance);
 
-  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units. Space is divided into cells
-  /// about as large as the distance of samples; all points of a cell share one list of octree nodes and
-  /// samples, found by a descent in which a node stands for its samples where a second-order estimate of the
-  /// error this makes is small against the whole sum. Cells are fixed in space, so that a point's value does
-  /// not depend on its company; points that lie near each other are cheap. Counts evaluated nodes and samples
-  /// in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy; the error estimate and the cells are
-  /// nacre's own.
+  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units. Space is divided into
+  /// blocks, those into cells, down to a few distances of samples. A node of the octree stands for its
+  /// samples, and its contribution to a block or cell is a Taylor series of second order around its centre,
+  /// where an estimate of both errors is small against the whole sum; what is too near for a block is left to
+  /// its parts, and in a cell summed point by point. Blocks and cells are fixed in space, so that a point's
+  /// value does not depend on its company; points that lie near each other are cheap. Counts evaluations of
+  /// R_d in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy, Greengard & Rokhlin 1987 for the
+  /// expansions; the error estimates and the cells are nacre's own.
   void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
   /// The same sum over every sample, in octree order.
   void eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
 
+  /// The cell of a point, in Morton order: points of one cell, and cells of one block, follow each other.
+  std::uint64_t cell_code(const Vec3& x) const noexcept;
+  /// The block of a cell.
+  static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
+
  private:
+  static constexpr int kBlockLevels = 3;  // a block has 8 x 8 x 8 cells
+
   // A sample or a node as the inner loop reads it: position and share (0 for a node), then E_t A.
   struct Source {
     float x, y, z, area;
     Float4 power;
   };
-  using CellIndex = std::array<std::int32_t, 3>;
+  struct Point {
+    std::uint64_t code;
+    std::uint32_t index;
+  };
+  struct Target;
+  struct Room;
 
-  CellIndex cell_of(const Vec3& x) const noexcept;
+  bool in_grid(const Vec3& x) const noexcept;
   Float4 guess(const Vec3& centre, std::uint64_t& evaluations) const noexcept;
-  void collect(const CellIndex& cell, std::vector<Source>& list, std::uint64_t& evaluations) const;
+  void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
   Rgb sum(std::span<const Source> list, const Vec3& x) const noexcept;
 
   const CacheGroup& group_;
   std::vector<Source> sources_;
   Kernel kernel_;
   double allowance_;
-  float nearest2_ = 0;  // squared distance within which samples are summed one by one
+  float nearest2_ = 0;     // squared distance within which samples are summed one by one
+  Vec3d origin_{0, 0, 0};  // corner of the first cell
   double cell_size_ = 1;
 };
 

@@ -34,20 +34,40 @@ class Kernel {
   static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
   bool singular() const noexcept { return singular_; }
 
-  /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), and of |R'|.
+  /// R with what its Taylor series around a point at squared distance `r2` takes: R'/r, and
+  /// (R'' - R'/r)/r^2. As a function of x, R(|x|) has the gradient `radial` x and the Hessian
+  /// `bend` x x^T + `radial` I.
+  struct Jet {
+    Float4 value, radial, bend;
+  };
+  Jet eval_jet(float r2) const noexcept {
+    const JetCell& cell = jets_[clamp_index(bits(r2) >> (23 - kJetBits), first_jet_, jets_.size())];
+    const Float4 fraction = broadcast(static_cast<float>(bits(r2) & kJetMask) * kJetScale);
+    return {eval(r2), cell.radial + fraction * cell.radial_delta, cell.bend + fraction * cell.bend_delta};
+  }
+
+  /// Upper bounds over all distances >= sqrt(r2): of the Hessian's norm, max(|R''|, |R'|/r), of |R'|, and of
+  /// the third derivative in any direction.
   struct Bounds {
-    Float4 hessian, slope;
+    Float4 hessian, slope, third;
   };
   const Bounds& bounds(float r2) const noexcept { return bounds_[bound_index(r2)]; }
 
  private:
   static constexpr int kCellBits = 8;   // cells per octave of r^2: 256
+  static constexpr int kJetBits = 6;    // cells of derivatives per octave: 64
   static constexpr int kBoundBits = 4;  // bound cells per octave: 16
+  static constexpr std::uint32_t kJetMask = (1u << (23 - kJetBits)) - 1;
+  static constexpr float kJetScale = 1.0f / static_cast<float>(1u << (23 - kJetBits));
   static constexpr std::uint32_t kFractionMask = (1u << (23 - kCellBits)) - 1;
   static constexpr float kFractionScale = 1.0f / static_cast<float>(1u << (23 - kCellBits));
 
   struct Cell {
     Float4 value, delta;
+  };
+
+  struct JetCell {
+    Float4 radial, radial_delta, bend, bend_delta;
   };
 
   static std::uint32_t bits(float r2) noexcept { return std::bit_cast<std::uint32_t>(r2); }
@@ -64,7 +84,8 @@ class Kernel {
 
   std::vector<Cell> cells_;  // first: below the table's start; last: beyond its end, zero
   std::vector<Bounds> bounds_;
-  std::uint32_t first_cell_ = 0, first_bound_ = 0;
+  std::vector<JetCell> jets_;
+  std::uint32_t first_cell_ = 0, first_bound_ = 0, first_jet_ = 0;
   bool singular_ = false;
 };
 

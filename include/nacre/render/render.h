@@ -46,11 +46,29 @@ struct RenderParams {
 /// Parameters for a camera of the scene as its film and sampler have them, without a crop.
 RenderParams default_render_params(const Scene& scene, std::size_t camera);
 
-/// Renders one picture; `cache` holds a group for each medium of the scene where the method uses one. A pixel
-/// depends on the scene, the cache, its own coordinates and the parameters but for the crop, and on nothing
-/// else: not on threads. Layers: `diffusion`, `single` and `specular` of translucent objects, `surface` of
-/// all others, means over the pixel's samples; R G B is their sum. Adds to `warnings` a line for each medium
-/// with samples that found no way out of it.
+class Translucency;
+
+/// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is
+/// there for the next.
+class Renderer {
+ public:
+  /// `cache` holds a group for each medium of the scene where the method uses one; world and cache have to
+  /// outlive it. Of `params` it takes the method, its tolerance, samples and bounces; pictures have the same.
+  Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report);
+  ~Renderer();
+
+  /// Renders one picture. A pixel depends on the scene, the cache, its own coordinates and the parameters but
+  /// for the crop, and on nothing else: not on threads, nor on pictures before it. Layers: `diffusion`,
+  /// `single` and `specular` of translucent objects, `surface` of all others, means over the pixel's samples;
+  /// R G B is their sum. Adds to `warnings` a line for each medium with samples that found no way out of it.
+  Image render(const RenderParams& params, Progress& progress, Report& report, Warnings& warnings) const;
+
+ private:
+  const World& world_;
+  std::vector<Translucency> media_;  // parallel to Scene::media
+};
+
+/// A single picture.
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,
              Report& report, Warnings& warnings);
 

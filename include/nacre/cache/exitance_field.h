@@ -1,0 +1,66 @@
+// Diffuse exitance over a whole surface: evaluated at nodes of its triangles, interpolated between them.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "nacre/cache/exitance.h"
+#include "nacre/geometry/mesh.h"
+#include "nacre/geometry/ray_tracer.h"
+
+namespace nacre {
+
+/// M_o on the meshes of one group as a continuous function, piecewise quadratic: nodes are the vertices of
+/// triangles and the midpoints of their edges; edges longer than the distance of nodes are halved first,
+/// those below half of it need no midpoint. Both rules see the edge alone, and nodes are known by their
+/// position, so that neighbours agree on a common edge whatever their size: there are no cracks. Nodes are
+/// evaluated when a point near them is asked for first, in blocks fixed in space; a value depends neither on
+/// when nor for whom. Safe to use from several threads. Meshes and exitance have to outlive it.
+class ExitanceField {
+ public:
+  /// Distance of nodes by default, in smallest mean free paths: M_o has no detail below about one.
+  static constexpr double kNodeDistance = 1.9;
+
+  /// `meshes` by the index that hits have (nullptr: of another medium); `distance` of nodes in scene units.
+  ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance);
+  /// Number of nodes that a field would have, about; fields for which that is more than kMostNodes are not
+  /// worth their memory.
+  static double predict_nodes(std::span<const Mesh* const> meshes, double distance);
+  static constexpr double kMostNodes = 20e6;
+
+  /// M_o at hits of those meshes. Adds to `evaluations` those that nodes took.
+  void eval(std::span<const Hit> hits, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
+  std::size_t node_count() const { return positions_.size(); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  // A triangle with its nodes: vertices a, b, c and the midpoints of ab, bc, ca, or kNone.
+  struct Patch {
+    std::array<std::uint32_t, 6> nodes;
+  };
+  // A triangle that is divided further: `first` of its parts in parts_, and how.
+  struct Split {
+    std::uint32_t first, pattern;
+  };
+  class Builder;
+
+  std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
+  void fill_block(std::uint32_t block, std::uint64_t& evaluations) const;
+  Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
+
+  const Exitance& exitance_;
+  std::vector<std::uint32_t> first_triangle_;  // by mesh: where its triangles begin in parts_
+  std::vector<std::uint32_t> parts_;           // a patch, or kSplitBit and a split
+  std::vector<Patch> patches_;
+  std::vector<Split> splits_;
+  std::vector<Vec3> positions_;             // of nodes, block by block
+  std::vector<std::uint32_t> block_of_;     // by node
+  std::vector<std::uint32_t> block_begin_;  // first node of each block, and the end
+  mutable std::vector<Rgb> values_;         // of nodes
+  std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_ready_;
+};
+
+}  // namespace nacre

@@ -1,0 +1,177 @@
+// label: analytic
+// Exitance interpolated over triangles against its evaluation at the points themselves.
+#include "nacre/cache/exitance_field.h"
+
+#include <gtest/gtest.h>
+
+#include "cache/sample_sets.h"
+#include "nacre/base/parallel.h"
+#include "nacre/geometry/primitives.h"
+
+namespace nacre {
+namespace {
+
+using namespace testing_support;
+
+// Samples on the square [-1,1]^2 and on the unit sphere, at the density that bake gives by default.
+struct Fixture {
+  explicit Fixture(const SurfaceSamples& samples, double tolerance = 0.01) : owned(make_group(samples)) {
+    double area = 0;
+    for (const float a : samples.areas) area += static_cast<double>(a);
+    spacing = hexagonal_spacing(area, static_cast<double>(samples.size()));
+    medium = make_medium(*find_preset("Marble"));
+    medium.scale = static_cast<float>(0.65 * double{smallest_mean_free_path(medium)} / spacing);
+    distance = ExitanceField::kNodeDistance * spacing / 0.65;
+    exitance = std::make_unique<const Exitance>(owned.group, medium, tolerance);
+    exact = std::make_unique<const Exitance>(owned.group, medium, 0);
+  }
+  OwnedGroup owned;
+  Medium medium;
+  double spacing = 0, distance = 0;
+  std::unique_ptr<const Exitance> exitance, exact;
+};
+
+std::vector<Rgb> eval(const ExitanceField& field, std::span<const Hit> hits) {
+  std::vector<Rgb> values(hits.size());
+  std::uint64_t evaluations = 0;
+  field.eval(hits, values, evaluations);
+  return values;
+}
+
+// Points all over a mesh, by triangle.
+std::vector<Hit> make_hits(const Mesh& mesh, std::size_t count) {
+  std::vector<Hit> hits;
+  Rng rng(9);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float root = std::sqrt(rng.next_float());
+    Hit hit{.t = 1, .mesh = 0, .triangle = 0, .u = root * rng.next_float(), .v = 1 - root};
+    hit.triangle = static_cast<std::uint32_t>(rng.next_bits() % mesh.triangles.size());
+    hits.push_back(hit);
+  }
+  return hits;
+}
+
+void expect_agreement(const Fixture& fixture, const Mesh& mesh, const char* name) {
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  const std::vector<Hit> hits = make_hits(mesh, 400);
+  const std::vector<Rgb> values = eval(field, hits);
+  double error[3]{}, norm[3]{}, brightest[3]{};
+  std::vector<Rgb> exact(hits.size());
+  std::uint64_t evaluations = 0;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const Vec3 x = hit_position(mesh, hits[i]);
+    fixture.exact->eval({&x, 1}, {&exact[i], 1}, evaluations);
+    for (int k = 0; k < 3; ++k) brightest[k] = std::max(brightest[k], double{exact[i][k]});
+  }
+  for (std::size_t i = 0; i < hits.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const double difference = double{values[i][k]} - double{exact[i][k]};
+      error[k] += square(difference);
+      norm[k] += square(double{exact[i][k]});
+      EXPECT_LT(std::abs(difference), 0.05 * double{exact[i][k]} + 1e-4 * brightest[k]) << name;
+    }
+  for (int k = 0; k < 3; ++k) EXPECT_LT(std::sqrt(error[k] / norm[k]), 0.01) << name;
+  EXPECT_LT(static_cast<double>(field.node_count()),
+            2 * ExitanceField::predict_nodes(std::vector<const Mesh*>{&mesh}, fixture.distance));
+}
+
+// A square of triangles of all sizes: one corner divided again and again, so that long edges border on short
+// ones; with slivers.
+Mesh make_graded_square() {
+  Mesh mesh;
+  mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  mesh.triangles = {{0, 2, 3}};
+  Triangle corner{0, 1, 2};
+  for (int i = 0; i < 8; ++i) {  // cut off a piece next to the corner's last edge
+    const Vec3 p = mesh.positions[corner[0]] * 0.4f + mesh.positions[corner[1]] * 0.6f;
+    mesh.positions.push_back(p);
+    const auto middle = static_cast<std::uint32_t>(mesh.positions.size() - 1);
+    mesh.triangles.push_back({corner[0], middle, corner[2]});
+    corner = {middle, corner[1], corner[2]};
+  }
+  mesh.triangles.push_back(corner);
+  return mesh;
+}
+
+TEST(ExitanceField, IsCloseToTheExactSumOnMeshesOfAllKinds) {
+  const Fixture plane(make_plane(90, &side_light)), sphere(make_sphere(90, &side_light));
+  expect_agreement(plane, make_rectangle(), "two large triangles");
+  expect_agreement(plane, make_graded_square(), "graded");
+  expect_agreement(sphere, make_sphere(), "far smaller triangles than needed");
+}
+
+// Both sides of every edge give the same value there, whatever is divided how.
+TEST(ExitanceField, HasNoCracks) {
+  const Fixture fixture(make_plane(60, &side_light));
+  const Mesh mesh = make_graded_square();
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  int compared = 0;
+  for (std::uint32_t a = 0; a < mesh.triangles.size(); ++a)
+    for (std::uint32_t b = 0; b < a; ++b) {
+      std::vector<std::array<std::size_t, 2>> shared;
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          if (mesh.triangles[a][i] == mesh.triangles[b][j]) shared.push_back({i, j});
+      if (shared.size() != 2) continue;
+      for (int step = 0; step <= 100; ++step) {
+        const auto hit_at = [&](std::uint32_t triangle, std::size_t side) {
+          std::array<float, 3> weights{};
+          weights[shared[0][side]] = 1 - static_cast<float>(step) / 100;
+          weights[shared[1][side]] = static_cast<float>(step) / 100;
+          return Hit{.t = 1, .mesh = 0, .triangle = triangle, .u = weights[1], .v = weights[2]};
+        };
+        const std::vector<Hit> hits{hit_at(a, 0), hit_at(b, 1)};
+        const std::vector<Rgb> values = eval(field, hits);
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(values[0][k] / values[1][k], 1, 2e-5) << a << " " << b;
+        ++compared;
+      }
+    }
+  EXPECT_GE(compared, 9 * 101);
+}
+
+TEST(ExitanceField, DependsNeitherOnOrderNorOnThreads) {
+  const Fixture fixture(make_plane(60, &side_light));
+  const Mesh mesh = make_graded_square();
+  const std::vector<Hit> hits = make_hits(mesh, 3000);
+  const std::vector<Rgb> once = eval(ExitanceField({&mesh}, *fixture.exitance, fixture.distance), hits);
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  std::vector<Rgb> together(hits.size());
+  parallel_for(hits.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::size_t i = hits.size() - 1 - n;
+      std::uint64_t evaluations = 0;
+      field.eval({&hits[i], 1}, {&together[i], 1}, evaluations);
+    }
+  });
+  EXPECT_EQ(once, together);
+}
+
+TEST(ExitanceField, EvaluatesEachNodeOnce) {
+  const Fixture fixture(make_plane(60, &side_light));
+  const Mesh mesh = make_rectangle();
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  const std::vector<Hit> hits = make_hits(mesh, 5000);
+  std::vector<Rgb> values(hits.size());
+  std::uint64_t first = 0, second = 0;
+  field.eval(hits, values, first);
+  field.eval(hits, values, second);
+  EXPECT_GT(first, field.node_count());
+  EXPECT_EQ(second, 0u);
+}
+
+// Meshes of another medium have no part in it; degenerate triangles do no harm.
+TEST(ExitanceField, TakesOddMeshes) {
+  const Fixture fixture(make_plane(40, &side_light));
+  Mesh mesh = make_rectangle();
+  mesh.triangles.push_back({0, 0, 1});
+  mesh.triangles.push_back({2, 2, 2});
+  const ExitanceField field({nullptr, &mesh}, *fixture.exitance, fixture.distance);
+  for (std::uint32_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
+    const Hit hit{.t = 1, .mesh = 1, .triangle = triangle, .u = 0.3f, .v = 0.3f};
+    const Rgb value = eval(field, {&hit, 1})[0];
+    for (int k = 0; k < 3; ++k) EXPECT_TRUE(std::isfinite(value[k]) && value[k] > 0) << triangle;
+  }
+}
+
+}  // namespace
+}  // namespace nacre
