@@ -23,6 +23,7 @@ struct Options {
   std::optional<double> tolerance;
   std::optional<int> single_samples, mc_samples;
   std::optional<std::string> mc_sampling;
+  int verify = 0;
   bool png = false;
 };
 
@@ -160,6 +161,8 @@ void check_combination(const Options& options) {
                     options.method));
   if ((options.mc_samples || options.mc_sampling) && method != Method::kMonteCarlo)
     throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
+  if (options.verify > 0 && method != Method::kHierarchical)
+    throw UsageError("--verify measures --method hierarchical; " + options.method + " has no such error");
   if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
@@ -244,6 +247,14 @@ void save_picture(const Image& image, const Picture& picture, const Options& opt
   session.progress().say(options.png ? picture.path + " and " + picture.preview : picture.path);
 }
 
+void report_verification(const Verification& verification, Session& session) {
+  fmt::print("diffusion at {} points: relative RMSE {:.3f} %, largest error {:.2f} % against the exact sum\n",
+             verification.points, 100 * verification.relative_rmse, 100 * verification.largest);
+  session.report().notes["verified"] =
+      fmt::format("{} points, relative RMSE {:.6g}, largest error {:.6g}", verification.points,
+                  verification.relative_rmse, verification.largest);
+}
+
 void run(const Options& options, const std::string& command_line) {
   const bool cached = uses_cache(method_of(options));
   check_combination(options);
@@ -277,6 +288,7 @@ void run(const Options& options, const std::string& command_line) {
                       {"nacre:seed", fmt::format("{}", options.common.seed)},
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
     save_picture(image, pictures[i], options, exposure, session);
+    if (options.verify > 0) report_verification(renderer.verify(params[i], options.verify), session);
   }
   session.finish();
 }
@@ -321,6 +333,11 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->add_option("--mc-sampling", options->mc_sampling,
                    "How they are chosen: by distance (exponential, default) or by area (uniform)")
       ->check(CLI::IsMember({"uniform", "exponential"}));
+  command
+      ->add_option(
+          "--verify", options->verify,
+          "Measure the error of the hierarchical sum at this many random pixels against the exact one")
+      ->check(CLI::Range(1, 1 << 24));
   command->add_option("--aov", options->aovs,
                       "none, all (default), or a list of layers, position, normal, depth, object");
   command->add_flag("--png", options->png, "Write an sRGB preview beside the OpenEXR file");

@@ -23,10 +23,12 @@ constexpr double kCalibration = 10;
 // The first guess opens nodes that are seen under more than this ratio of radius to distance.
 constexpr float kGuessRatio2 = 0.7f * 0.7f;
 
-// Side of a cell in hexagonal spacings of the samples: larger cells are shared by more points, smaller ones
-// have shorter lists.
+// A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
+// share of the bound on its third derivatives.
 constexpr float kSeriesWeight = 0.2f;
-constexpr double kCellSpacings = 3;
+
+// Points per cell above which smaller ones are cheaper.
+constexpr double kPointsPerCell = 20;
 
 float distance2(const OctreeNode& node, const Vec3& x) noexcept {
   const float dx = x.x - node.centre[0], dy = x.y - node.centre[1], dz = x.z - node.centre[2];
@@ -97,6 +99,12 @@ std::uint64_t Exitance::cell_code(const Vec3& x) const noexcept {
   return code;
 }
 
+int Exitance::leaf_level_for(double points) const noexcept {
+  const double cells = group_.surface_area / square(cell_size_ * (1 << kLeafLevel));
+  const double finer = std::log(points / std::max(cells, 1.0) / kPointsPerCell) / std::log(4.0);
+  return std::clamp(kLeafLevel - static_cast<int>(std::lround(finer)), 0, kLeafLevel);
+}
+
 bool Exitance::in_grid(const Vec3& x) const noexcept {
   const Vec3d offset = (Vec3d(x) - origin_) / cell_size_;
   return std::min({offset.x, offset.y, offset.z}) >= 0 && std::max({offset.x, offset.y, offset.z}) < 0x1p21;
@@ -113,6 +121,7 @@ struct Exitance::Target {
 struct Exitance::Room {
   std::span<const Vec3> points;
   std::span<Rgb> exitance;
+  int leaf_level;
   std::array<Target, kBlockLevels + 1> targets;
   std::vector<Source> list;
   std::uint64_t evaluations = 0;
@@ -173,7 +182,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
         return true;
       }
       if (all_at_most(error, allowed)) {
-        if (level == 0)
+        if (level == room.leaf_level)
           room.list.push_back({node.centre[0], node.centre[1], node.centre[2], 0, power});
         else
           target.pending.push_back(static_cast<std::uint32_t>(&node - group_.nodes.data()));
@@ -181,7 +190,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       }
     }
     // Smaller targets are further away.
-    if (level == 0 || (node.radius > target.radius && node.child_count() > 0)) return false;
+    if (level == room.leaf_level || (node.radius > target.radius && node.child_count() > 0)) return false;
     target.pending.push_back(static_cast<std::uint32_t>(&node - group_.nodes.data()));
     return true;
   };
@@ -194,7 +203,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   else
     descend(group_.nodes, 0, accept, leaf);
 
-  if (level == 0) {
+  if (level == room.leaf_level) {
     for (const Point& point : range) {
       const Vec3& x = room.points[point.index];
       const Float4 far = target.far.eval(x - target.centre);
@@ -229,7 +238,8 @@ Rgb Exitance::sum(std::span<const Source> list, const Vec3& x) const noexcept {
   return {static_cast<float>(total[0]), static_cast<float>(total[1]), static_cast<float>(total[2])};
 }
 
-void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const {
+void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
+                    int leaf_level) const {
   if (allowance_ <= 0 || group_.nodes.empty()) return eval_exact(points, exitance, evaluations);
   std::vector<Point> order;
   order.reserve(points.size());
@@ -240,7 +250,7 @@ void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::
       eval_exact(points.subspan(i, 1), exitance.subspan(i, 1), evaluations);
   }
   std::ranges::sort(order, {}, &Point::code);
-  Room room{points, exitance, {}, {}, 0};
+  Room room{points, exitance, leaf_level, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && block_of(order[end].code) == block_of(order[begin].code)) ++end;

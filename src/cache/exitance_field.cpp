@@ -103,7 +103,7 @@ class ExitanceField::Builder {
   Builder(ExitanceField& field, double distance, std::size_t expected)
       : field_(field),
         longest2_(static_cast<float>(square(distance))),
-        straight2_(static_cast<float>(square(distance / 2))),
+        straight2_(static_cast<float>(square(distance / 3))),
         table_(expected) {}
 
   std::uint32_t add_node(const Vec3& p) { return table_.find_or_add(p, field_.positions_); }
@@ -204,6 +204,8 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
     }
   }
 
+  leaf_level_ = exitance.leaf_level_for(static_cast<double>(positions_.size()));
+
   // Nodes of one block side by side, in the order in which the sum is cheapest.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order(positions_.size());
   parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -249,7 +251,7 @@ std::uint32_t ExitanceField::find_patch(const Hit& hit, float& u, float& v) cons
 void ExitanceField::fill_block(std::uint32_t block, std::uint64_t& evaluations) const {
   const std::size_t begin = block_begin_[block], count = block_begin_[block + 1] - begin;
   exitance_.eval(std::span(positions_).subspan(begin, count), std::span(values_).subspan(begin, count),
-                 evaluations);
+                 evaluations, leaf_level_);
   block_state_[block].store(kFull, std::memory_order_release);
   block_state_[block].notify_all();
 }

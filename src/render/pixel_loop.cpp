@@ -77,27 +77,31 @@ std::uint64_t PixelLoop::pixel_key(std::uint32_t pixel, std::uint64_t purpose) c
   return hash_words(params_.seed, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y), purpose);
 }
 
+PixelLoop::CameraSample PixelLoop::camera_ray(std::uint32_t pixel, std::uint32_t sample) const {
+  const std::uint64_t key = pixel_key(pixel, 0), lens_key = hash_words(key, 1);
+  const auto [x, y] = place(pixel);
+  const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  const FilterSample offset = filter_.sample(sobol_2d(sample, key));
+  return {camera_.at(centre + offset.offset, sobol_2d(sample, lens_key)), offset.weight};
+}
+
 std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size_t end,
                                                     PixelBuffer& pixels) const {
   std::vector<Path> paths;
   paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
-  for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
-    const std::uint64_t key = pixel_key(pixel, 0), lens_key = hash_words(key, 1);
-    const auto [x, y] = place(pixel);
-    const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel)
     for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
-      const FilterSample offset = filter_.sample(sobol_2d(sample, key));
+      const CameraSample start = camera_ray(pixel, sample);
       Path path;
-      path.ray.ray = camera_.at(centre + offset.offset, sobol_2d(sample, lens_key));
+      path.ray.ray = start.ray;
       // Of a few samples the weights might hardly add up to anything.
-      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : offset.weight;
+      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : start.weight;
       path.throughput = Rgb(weight);
       pixels.weight[pixel] += weight;
       path.pixel = pixel;
       path.sample = sample;
       paths.push_back(path);
     }
-  }
   return paths;
 }
 

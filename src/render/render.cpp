@@ -2,6 +2,7 @@
 #include "nacre/render/render.h"
 
 #include "nacre/base/parallel.h"
+#include "nacre/base/random.h"
 #include "render/pixel_loop.h"
 
 namespace nacre {
@@ -84,6 +85,38 @@ Image Renderer::render(const RenderParams& params, Progress& progress, Report& r
   for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
   return pixels.make_image(params);
+}
+
+Verification Renderer::verify(const RenderParams& params, int count) const {
+  const PixelLoop loop(world_, media_, params);
+  const std::uint64_t pixels =
+      static_cast<std::uint64_t>(params.crop_width) * static_cast<std::uint64_t>(params.crop_height);
+  std::vector<Hit> hits;
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t pixel = hash_words(params.seed, 0x766572, static_cast<std::uint64_t>(i)) % pixels;
+    const Hit hit = loop.first_hit(static_cast<std::uint32_t>(pixel));
+    if (!hit || world_.shape(hit).medium == kNone) continue;
+    if (!world_.scene->media[static_cast<std::size_t>(world_.shape(hit).medium)].lambert) hits.push_back(hit);
+  }
+  std::vector<Rgb> values(hits.size()), exact(hits.size());
+  parallel_for(hits.size(), 8, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      media_[static_cast<std::size_t>(world_.shape(hits[i]).medium)].eval_exitance(
+          std::span(hits).subspan(i, 1), std::span(values).subspan(i, 1), std::span(exact).subspan(i, 1));
+  });
+  Verification result{hits.size(), 0, 0};
+  for (int k = 0; k < 3; ++k) {
+    double brightest = 0, error = 0, norm = 0;
+    for (const Rgb& value : exact) brightest = std::max(brightest, double{value[k]});
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      const double expected = double{exact[i][k]}, difference = std::abs(double{values[i][k]} - expected);
+      error += square(difference);
+      norm += square(expected);
+      if (expected > 1e-4 * brightest) result.largest = std::max(result.largest, difference / expected);
+    }
+    if (norm > 0) result.relative_rmse = std::max(result.relative_rmse, std::sqrt(error / norm));
+  }
+  return result;
 }
 
 }  // namespace nacre

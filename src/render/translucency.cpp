@@ -29,7 +29,7 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_)) {
     exitance_ = std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
-    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field();
+    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field(params.tolerance);
   } else if (method_ == Method::kMonteCarlo)
     monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
@@ -39,13 +39,14 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
 
 // Where R_d has no bound, M_o has detail at every sample; and where a body has so many mean free paths that
 // nodes would fill the memory, pixels are fewer.
-void Translucency::make_field() {
+void Translucency::make_field(double tolerance) {
   const Medium& m = world_.scene->media[medium_];
   if (m.profile == ProfileKind::kNormalized) return;
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
-  const double distance = ExitanceField::kNodeDistance * double{smallest_mean_free_path(m)} / double{m.scale};
+  const double distance =
+      ExitanceField::node_distance(tolerance) * double{smallest_mean_free_path(m)} / double{m.scale};
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
 }
@@ -80,6 +81,18 @@ void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<R
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     radiance[i] *= exit_transmittance(world_, points[i].hit, points[i].surface, points[i].out) * exit_factor_;
+}
+
+void Translucency::eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance,
+                                 std::span<Rgb> exact) const {
+  std::vector<Vec3> positions;
+  for (const Hit& hit : hits) positions.push_back(hit_position(world_.shape(hit).mesh, hit));
+  std::uint64_t evaluations = 0;
+  if (field_)
+    field_->eval(hits, exitance, evaluations);
+  else
+    exitance_->eval(positions, exitance, evaluations);
+  exitance_->eval_exact(positions, exact, evaluations);
 }
 
 Rgb Translucency::lambert_exitance(const ExitPoint& point) const {

@@ -34,11 +34,13 @@ class Translucency {
   /// those of the profile.
   void eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
                       std::uint64_t& evaluations) const;
+  /// M_o of kHierarchical at hits, and the sum over every sample that it stands for.
+  void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   bool has_single_scattering() const { return single_.has_value(); }
   Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
 
  private:
-  void make_field();
+  void make_field(double tolerance);
   Rgb lambert_exitance(const ExitPoint& point) const;
 
   const World& world_;

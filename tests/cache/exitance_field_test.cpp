@@ -21,7 +21,7 @@ struct Fixture {
     spacing = hexagonal_spacing(area, static_cast<double>(samples.size()));
     medium = make_medium(*find_preset("Marble"));
     medium.scale = static_cast<float>(0.65 * double{smallest_mean_free_path(medium)} / spacing);
-    distance = ExitanceField::kNodeDistance * spacing / 0.65;
+    distance = ExitanceField::node_distance(tolerance) * spacing / 0.65;
     exitance = std::make_unique<const Exitance>(owned.group, medium, tolerance);
     exact = std::make_unique<const Exitance>(owned.group, medium, 0);
   }
@@ -51,7 +51,7 @@ std::vector<Hit> make_hits(const Mesh& mesh, std::size_t count) {
   return hits;
 }
 
-void expect_agreement(const Fixture& fixture, const Mesh& mesh, const char* name) {
+void expect_agreement(const Fixture& fixture, const Mesh& mesh, double tolerance, const char* name) {
   const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
   const std::vector<Hit> hits = make_hits(mesh, 400);
   const std::vector<Rgb> values = eval(field, hits);
@@ -70,7 +70,8 @@ void expect_agreement(const Fixture& fixture, const Mesh& mesh, const char* name
       norm[k] += square(double{exact[i][k]});
       EXPECT_LT(std::abs(difference), 0.05 * double{exact[i][k]} + 1e-4 * brightest[k]) << name;
     }
-  for (int k = 0; k < 3; ++k) EXPECT_LT(std::sqrt(error[k] / norm[k]), 0.01) << name;
+  for (int k = 0; k < 3; ++k)
+    EXPECT_LT(std::sqrt(error[k] / norm[k]), tolerance) << name << ", tolerance " << tolerance;
   EXPECT_LT(static_cast<double>(field.node_count()),
             2 * ExitanceField::predict_nodes(std::vector<const Mesh*>{&mesh}, fixture.distance));
 }
@@ -94,10 +95,13 @@ Mesh make_graded_square() {
 }
 
 TEST(ExitanceField, IsCloseToTheExactSumOnMeshesOfAllKinds) {
-  const Fixture plane(make_plane(90, &side_light)), sphere(make_sphere(90, &side_light));
-  expect_agreement(plane, make_rectangle(), "two large triangles");
-  expect_agreement(plane, make_graded_square(), "graded");
-  expect_agreement(sphere, make_sphere(), "far smaller triangles than needed");
+  for (const double tolerance : {0.01, 0.001}) {
+    const Fixture plane(make_plane(90, &side_light), tolerance),
+        sphere(make_sphere(90, &side_light), tolerance);
+    expect_agreement(plane, make_rectangle(), tolerance, "two large triangles");
+    expect_agreement(plane, make_graded_square(), tolerance, "graded");
+    expect_agreement(sphere, make_sphere(), tolerance, "small triangles");
+  }
 }
 
 // Both sides of every edge give the same value there, whatever is divided how.

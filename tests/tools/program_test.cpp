@@ -106,10 +106,10 @@ TEST_F(Program, SingleScatteringAndMethodsHaveTheirOptions) {
 
 TEST_F(Program, OptionsWithNothingToActOnAreRefused) {
   run("bake s.xml -o s.cache");
-  for (const char* options :
-       {"--method montecarlo --cache s.cache", "--method lambert --spacing 1", "--mc-samples 4",
-        "--mc-sampling uniform", "--method exact --tolerance 0.1", "--method montecarlo --interreflect",
-        "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
+  for (const char* options : {"--method montecarlo --cache s.cache", "--method lambert --spacing 1",
+                              "--mc-samples 4", "--mc-sampling uniform", "--method exact --tolerance 0.1",
+                              "--method exact --verify 9", "--method montecarlo --interreflect",
+                              "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
     EXPECT_EQ(run_nacre(folder_, std::string("render s.xml -o x.exr ") + options).exit_code, 2) << options;
   EXPECT_FALSE(std::filesystem::exists(folder_.file("x.exr")));
 }
@@ -202,6 +202,35 @@ TEST_F(Program, HierarchicalMeetsItsTolerance) {
   run("render s.xml --cache c.nacre -o zero.exr --tolerance 0");
   run("diff fast.exr exact.exr --layer diffusion --fail-above 0.01");
   expect_identical("zero.exr", "exact.exr");
+}
+
+TEST_F(Program, VerifyMeasuresTheErrorOfThePicture) {
+  const auto measured = [&](const std::string& options) {
+    const std::string output = run("render s.xml -o v.exr --single-samples 0 --verify 500 " + options);
+    int points = 0;
+    double rmse = -1, largest = -1;
+    EXPECT_EQ(std::sscanf(output.substr(output.find("diffusion at ")).c_str(),
+                          "diffusion at %d points: relative RMSE %lf %%, largest error %lf %%", &points,
+                          &rmse, &largest),
+              3)
+        << output;
+    EXPECT_GT(points, 50);
+    EXPECT_LE(rmse, largest);
+    return rmse;
+  };
+  const double loose = measured("--tolerance 0.1");
+  EXPECT_GT(loose, 0);
+  EXPECT_LE(loose, 10);
+  EXPECT_LE(measured("--tolerance 0.001"), 0.1);
+  EXPECT_EQ(measured("--tolerance 0"), 0);
+}
+
+// What was evaluated for one picture serves the next, and changes nothing in it.
+TEST_F(Program, CamerasTogetherAreAsAlone) {
+  run("bake s.xml -o c.nacre");
+  run("render s.xml --cache c.nacre -o alone.exr --camera other");
+  run("render s.xml --cache c.nacre -o many.exr --camera main,other");
+  expect_identical("many.other.exr", "alone.exr");
 }
 
 TEST_F(Program, OtherCamerasAndSizes) {

@@ -28,7 +28,13 @@ class Exitance {
   /// value does not depend on its company; points that lie near each other are cheap. Counts evaluations of
   /// R_d in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy, Greengard & Rokhlin 1987 for the
   /// expansions; the error estimates and the cells are nacre's own.
-  void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
+  void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
+            int leaf_level = kLeafLevel) const;
+  /// Cells that are divided no further have sides of 2^`leaf_level` * kCellSpacings spacings of the samples.
+  /// The default is for points about as dense as samples; where there are more, smaller cells are cheaper.
+  static constexpr int kLeafLevel = 2;
+  /// The same for `points` all over the surface.
+  int leaf_level_for(double points) const noexcept;
   /// The same sum over every sample, in octree order.
   void eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
 
@@ -38,7 +44,7 @@ class Exitance {
   static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
 
  private:
-  static constexpr int kBlockLevels = 3;  // a block has 8 x 8 x 8 cells
+  static constexpr int kBlockLevels = 5;  // a block has 32 cells along each side
 
   // A sample or a node as the inner loop reads it: position and share (0 for a node), then E_t A.
   struct Source {
@@ -55,6 +61,7 @@ class Exitance {
   bool in_grid(const Vec3& x) const noexcept;
   Float4 guess(const Vec3& centre, std::uint64_t& evaluations) const noexcept;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
+  static constexpr double kCellSpacings = 0.75;
   Rgb sum(std::span<const Source> list, const Vec3& x) const noexcept;
 
   const CacheGroup& group_;

@@ -48,6 +48,14 @@ RenderParams default_render_params(const Scene& scene, std::size_t camera);
 
 class Translucency;
 
+/// Errors of the hierarchical diffusion against the sum over every sample, by the definitions that `nacre
+/// diff` uses for images: the worst channel counts, the largest is over points brighter than 1e-4 of the
+/// brightest.
+struct Verification {
+  std::size_t points = 0;  // on translucent surfaces
+  double relative_rmse = 0, largest = 0;
+};
+
 /// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is
 /// there for the next.
 class Renderer {
@@ -62,6 +70,9 @@ class Renderer {
   /// `single` and `specular` of translucent objects, `surface` of all others, means over the pixel's samples;
   /// R G B is their sum. Adds to `warnings` a line for each medium with samples that found no way out of it.
   Image render(const RenderParams& params, Progress& progress, Report& report, Warnings& warnings) const;
+
+  /// Measures the error of kHierarchical at what the first samples of `count` random pixels see.
+  Verification verify(const RenderParams& params, int count) const;
 
  private:
   const World& world_;
