@@ -219,7 +219,7 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     renumbered[order[i].second] = i;
     sorted[i] = positions_[order[i].second];
-    if (i == 0 || Exitance::block_of(order[i].first) != Exitance::block_of(order[i - 1].first))
+    if (i == 0 || block_of_cell(order[i].first) != block_of_cell(order[i - 1].first))
       block_begin_.push_back(i);
     block_of_[i] = static_cast<std::uint32_t>(block_begin_.size() - 1);
   }
@@ -248,12 +248,22 @@ std::uint32_t ExitanceField::find_patch(const Hit& hit, float& u, float& v) cons
   return part;
 }
 
-void ExitanceField::fill_block(std::uint32_t block, std::uint64_t& evaluations) const {
-  const std::size_t begin = block_begin_[block], count = block_begin_[block + 1] - begin;
-  exitance_.eval(std::span(positions_).subspan(begin, count), std::span(values_).subspan(begin, count),
-                 evaluations, leaf_level_);
-  block_state_[block].store(kFull, std::memory_order_release);
-  block_state_[block].notify_all();
+// Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.
+void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const {
+  std::vector<Vec3> positions;
+  for (const std::uint32_t block : blocks)
+    positions.insert(positions.end(), positions_.begin() + block_begin_[block],
+                     positions_.begin() + block_begin_[block + 1]);
+  std::vector<Rgb> values(positions.size());
+  exitance_.eval(positions, values, evaluations, leaf_level_);
+  auto value = values.begin();
+  for (const std::uint32_t block : blocks) {
+    const auto count = static_cast<std::ptrdiff_t>(block_begin_[block + 1] - block_begin_[block]);
+    std::copy(value, value + count, values_.begin() + block_begin_[block]);
+    value += count;
+    block_state_[block].store(kFull, std::memory_order_release);
+    block_state_[block].notify_all();
+  }
 }
 
 Rgb ExitanceField::interpolate(const Patch& patch, float u, float v) const noexcept {
@@ -276,8 +286,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     float u, v;
   };
   std::vector<Place> places(hits.size());
-  std::vector<std::uint32_t> missing, awaited;
-  std::vector<std::uint32_t> blocks;
+  std::vector<std::uint32_t> missing, blocks, claimed, awaited;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     places[i].patch = find_patch(hits[i], places[i].u, places[i].v);
     if (!patch_ready_[places[i].patch].load(std::memory_order_acquire)) missing.push_back(places[i].patch);
@@ -291,10 +300,11 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   for (const std::uint32_t block : blocks) {
     std::uint8_t state = kEmpty;
     if (block_state_[block].compare_exchange_strong(state, kBusy))
-      fill_block(block, evaluations);
+      claimed.push_back(block);
     else if (state == kBusy)
       awaited.push_back(block);
   }
+  if (!claimed.empty()) fill_blocks(claimed, evaluations);
   for (const std::uint32_t block : awaited) block_state_[block].wait(kBusy, std::memory_order_acquire);
   for (const std::uint32_t patch : missing) patch_ready_[patch].store(1, std::memory_order_release);
   for (std::size_t i = 0; i < hits.size(); ++i)

@@ -40,11 +40,11 @@ class Exitance {
 
   /// The cell of a point, in Morton order: points of one cell, and cells of one block, follow each other.
   std::uint64_t cell_code(const Vec3& x) const noexcept;
-  /// The block of a cell.
-  static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
 
  private:
   static constexpr int kBlockLevels = 5;  // a block has 32 cells along each side
+
+  static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
 
   // A sample or a node as the inner loop reads it: position and share (0 for a node), then E_t A.
   struct Source {

@@ -53,8 +53,14 @@ class ExitanceField {
   };
   class Builder;
 
+  // What is filled at once has sides of 6 sample distances.
+  static std::uint64_t block_of_cell(std::uint64_t cell_code) noexcept {
+    return cell_code >> 3 * kBlockLevel;
+  }
+  static constexpr int kBlockLevel = 3;
+
   std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
-  void fill_block(std::uint32_t block, std::uint64_t& evaluations) const;
+  void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
 
   const Exitance& exitance_;
