@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include "cache/local_expansion.h"
 #include "cache/sample_sets.h"
+#include "nacre/base/sampling.h"
 
 namespace nacre {
 namespace {
@@ -100,6 +102,36 @@ TEST_P(EveryKernel, BoundsHoldEverywhereBeyondAndAreMonotone) {
       ASSERT_LE(b.slope[k], previous.slope[k]) << r;
       ASSERT_LE(b.hessian[k], previous.hessian[k]) << r;
       previous = b;
+    }
+  }
+}
+
+// A Taylor series of R(|x|) about a point errs by no more than the bound on third derivatives says, wherever
+// it is evaluated; moved elsewhere it is the same function.
+TEST_P(EveryKernel, SeriesErrNoMoreThanTheirBound) {
+  Rng rng(7);
+  const auto random_direction = [&] { return sample_uniform_sphere(rng.next_2d()); };
+  for (int i = 0; i < 20000; ++i) {
+    const double width = profiles_[static_cast<std::size_t>(i % 3)].width;
+    const auto distance = static_cast<float>(width * std::pow(100, rng.next_double() - 0.2));
+    const float radius = 0.5f * distance * rng.next_float();
+    const Vec3 offset = random_direction() * distance, at = random_direction() * radius,
+               moved = random_direction() * radius;
+    LocalExpansion series;
+    series.add(broadcast(2), kernel_.eval_jet(dot(offset, offset)), offset);
+    const Float4 value = series.eval(at), again = series.moved(moved).eval(at - moved);
+    const Kernel::Bounds& bounds = kernel_.bounds(square(distance - radius));
+    for (int k = 0; k < 3; ++k) {
+      // Further out an octave is many decay lengths.
+      if (largest_sigma(profiles_[static_cast<std::size_t>(k)]) * double{distance} > 15) continue;
+      const double exact =
+          2 * eval_profile(profiles_[static_cast<std::size_t>(k)], double{(offset + at).length()});
+      const double scale =
+          2 * eval_profile(profiles_[static_cast<std::size_t>(k)], double{distance - radius});
+      const double bound = 2 * double{bounds.third[k]} * std::pow(double{radius}, 3) / 6;
+      // Tables of derivatives are linear between 64 entries an octave, and floats are floats.
+      ASSERT_LE(std::abs(double{value[k]} - exact), bound + 2e-3 * scale) << distance << " " << radius;
+      ASSERT_NEAR(value[k], again[k], 1e-4 * scale) << distance << " " << radius;
     }
   }
 }
