@@ -10,6 +10,11 @@ namespace nacre {
 namespace {
 
 enum BlockState : std::uint8_t { kEmpty, kBusy, kFull };
+enum PatchState : std::uint8_t { kUnknown, kSmooth, kSteep };
+
+// A patch over which M_o bends by more than this share of itself, or changes so much along an edge, may err
+// by more than the tolerance: light there is as narrow as a mean free path.
+constexpr float kMostBend = 0.02f, kMostChange = 0.2f;
 
 // How a triangle is divided, once turned so that the edges concerned come in this order.
 enum Pattern : std::uint32_t {
@@ -182,9 +187,9 @@ double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double 
 }
 
 ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance)
-    : exitance_(exitance) {
+    : exitance_(exitance), meshes_(std::move(meshes)) {
   std::size_t triangles = 0;
-  for (const Mesh* const mesh : meshes) {
+  for (const Mesh* const mesh : meshes_) {
     first_triangle_.push_back(static_cast<std::uint32_t>(triangles));
     if (mesh) triangles += mesh->triangles.size();
   }
@@ -192,12 +197,12 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
   patches_.reserve(triangles);
   Builder builder(*this, distance, triangles);
   std::vector<std::uint32_t> node_of_vertex;
-  for (std::size_t m = 0; m < meshes.size(); ++m) {
-    if (!meshes[m]) continue;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (!meshes_[m]) continue;
     node_of_vertex.clear();
-    for (const Vec3& p : meshes[m]->positions) node_of_vertex.push_back(builder.add_node(p));
-    for (std::size_t i = 0; i < meshes[m]->triangles.size(); ++i) {
-      const Triangle& t = meshes[m]->triangles[i];
+    for (const Vec3& p : meshes_[m]->positions) node_of_vertex.push_back(builder.add_node(p));
+    for (std::size_t i = 0; i < meshes_[m]->triangles.size(); ++i) {
+      const Triangle& t = meshes_[m]->triangles[i];
       const std::uint32_t part =
           builder.divide({node_of_vertex[t[0]], node_of_vertex[t[1]], node_of_vertex[t[2]]}, 0);
       parts_[first_triangle_[m] + i] = part;
@@ -233,7 +238,7 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
   });
   values_.resize(positions_.size());
   block_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(blocks);
-  patch_ready_ = std::make_unique<std::atomic<std::uint8_t>[]>(patches_.size());
+  patch_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(patches_.size());
 }
 
 // The patch that a hit lies in, and its weights there.
@@ -266,6 +271,21 @@ void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint
   }
 }
 
+bool ExitanceField::is_steep(const Patch& patch) const noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Rgb &a = values_[patch.nodes[i]], &b = values_[patch.nodes[(i + 1) % 3]];
+    const Rgb mean = (a + b) * 0.5f;
+    const bool bends = patch.nodes[3 + i] != kNone;
+    const Rgb bend = bends ? values_[patch.nodes[3 + i]] - mean : Rgb(0, 0, 0);
+    for (int k = 0; k < 3; ++k) {
+      const float size = bends ? std::max(mean[k], values_[patch.nodes[3 + i]][k]) : mean[k];
+      if (std::abs(bend[k]) > kMostBend * size || (!bends && std::abs(a[k] - b[k]) > kMostChange * size))
+        return true;
+    }
+  }
+  return false;
+}
+
 Rgb ExitanceField::interpolate(const Patch& patch, float u, float v) const noexcept {
   const float w = 1 - u - v;
   const Rgb &a = values_[patch.nodes[0]], &b = values_[patch.nodes[1]], &c = values_[patch.nodes[2]];
@@ -289,7 +309,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   std::vector<std::uint32_t> missing, blocks, claimed, awaited;
   for (std::size_t i = 0; i < hits.size(); ++i) {
     places[i].patch = find_patch(hits[i], places[i].u, places[i].v);
-    if (!patch_ready_[places[i].patch].load(std::memory_order_acquire)) missing.push_back(places[i].patch);
+    if (!patch_state_[places[i].patch].load(std::memory_order_acquire)) missing.push_back(places[i].patch);
   }
   for (const std::uint32_t patch : missing)
     for (const std::uint32_t node : patches_[patch].nodes)
@@ -306,9 +326,21 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   }
   if (!claimed.empty()) fill_blocks(claimed, evaluations);
   for (const std::uint32_t block : awaited) block_state_[block].wait(kBusy, std::memory_order_acquire);
-  for (const std::uint32_t patch : missing) patch_ready_[patch].store(1, std::memory_order_release);
-  for (std::size_t i = 0; i < hits.size(); ++i)
-    exitance[i] = interpolate(patches_[places[i].patch], places[i].u, places[i].v);
+  for (const std::uint32_t patch : missing)
+    patch_state_[patch].store(is_steep(patches_[patch]) ? kSteep : kSmooth, std::memory_order_release);
+  std::vector<std::uint32_t> steep;
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    if (patch_state_[places[i].patch].load(std::memory_order_acquire) == kSteep)
+      steep.push_back(i);
+    else
+      exitance[i] = interpolate(patches_[places[i].patch], places[i].u, places[i].v);
+  }
+  if (steep.empty()) return;
+  std::vector<Vec3> positions;
+  for (const std::uint32_t i : steep) positions.push_back(hit_position(*meshes_[hits[i].mesh], hits[i]));
+  std::vector<Rgb> values(steep.size());
+  exitance_.eval(positions, values, evaluations);
+  for (std::size_t i = 0; i < steep.size(); ++i) exitance[steep[i]] = values[i];
 }
 
 }  // namespace nacre

@@ -29,7 +29,7 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_)) {
     exitance_ = std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
-    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field(params.tolerance);
+    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field(*group, params.tolerance);
   } else if (method_ == Method::kMonteCarlo)
     monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
@@ -37,16 +37,17 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
     single_.emplace(world, medium);
 }
 
-// Where R_d has no bound, M_o has detail at every sample; and where a body has so many mean free paths that
-// nodes would fill the memory, pixels are fewer.
-void Translucency::make_field(double tolerance) {
+// Where R_d has no bound, or samples are further apart than a mean free path, M_o has detail at every sample;
+// and where a body has so many mean free paths that nodes would fill the memory, pixels are fewer.
+void Translucency::make_field(const CacheGroup& group, double tolerance) {
   const Medium& m = world_.scene->media[medium_];
   if (m.profile == ProfileKind::kNormalized) return;
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
-  const double distance =
-      ExitanceField::node_distance(tolerance) * double{smallest_mean_free_path(m)} / double{m.scale};
+  const double length = double{smallest_mean_free_path(m)} / double{m.scale};
+  if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
+  const double distance = ExitanceField::node_distance(tolerance) * length;
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
 }

@@ -40,7 +40,7 @@ class Translucency {
   Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
 
  private:
-  void make_field(double tolerance);
+  void make_field(const CacheGroup& group, double tolerance);
   Rgb lambert_exitance(const ExitPoint& point) const;
 
   const World& world_;

@@ -61,9 +61,11 @@ class ExitanceField {
 
   std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
+  bool is_steep(const Patch& patch) const noexcept;
   Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
 
   const Exitance& exitance_;
+  std::vector<const Mesh*> meshes_;
   int leaf_level_ = 0;
   std::vector<std::uint32_t> first_triangle_;  // by mesh: where its triangles begin in parts_
   std::vector<std::uint32_t> parts_;           // a patch, or kSplitBit and a split
@@ -73,7 +75,7 @@ class ExitanceField {
   std::vector<std::uint32_t> block_of_;     // by node
   std::vector<std::uint32_t> block_begin_;  // first node of each block, and the end
   mutable std::vector<Rgb> values_;         // of nodes
-  std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_ready_;
+  std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_state_;
 };
 
 }  // namespace nacre
