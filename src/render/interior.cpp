@@ -38,11 +38,13 @@ float tilt(const SurfacePoint& point) {
 // How much longer a way of length `t` to a hit is on the smooth surface that interpolated normals belong to.
 // Without this, depths belong to flat triangles and cosines to the normals, and a coarse mesh shows its
 // facets. The chord between two points of a smooth surface is square to the mean of their normals (of a
-// sphere exactly), so the way ends on the plane through `top` that the mean normal gives, as far as the tilt
-// of the normals against the triangles accounts for it. That is for ways that come out near where they began,
-// on the same sheet of surface; further on, and across to the other side, the mesh itself is the better judge
-// of how thick a body is (normals round the edges of a box make it a ball).
-float smoothing(const SheetPoint& top, const Vec3& direction, float t, const SurfacePoint& hit) {
+// sphere exactly), which tells how far above the hit that surface is, as far as the tilt of the normals
+// against the triangles accounts for it. That is for ways that come out near where they began, on the same
+// sheet of surface; further on, and across to the other side, the mesh itself is the better judge of how
+// thick a body is (normals round the edges of a box make it a ball). `normal` is that of the hit, bent
+// towards the direction.
+float smoothing(const SheetPoint& top, const Vec3& direction, float t, const SurfacePoint& hit,
+                const Vec3& normal) {
   constexpr float kSameSheet = 0.5f;    // cosine between normals from which on they share a sheet
   constexpr float kNear = 2, kFar = 4;  // in triangles
   constexpr float kShortest = -0.75f, kLongest = 3;  // in lengths of the way
@@ -56,8 +58,7 @@ float smoothing(const SheetPoint& top, const Vec3& direction, float t, const Sur
   // How far the smooth surface is above the hit, and one step from there onto its tangent plane.
   const Vec3 mean = (top.normal + hit.shading_normal).normalized();
   const float height = std::clamp(dot(chord, mean), -most, most) / dot(hit.shading_normal, mean);
-  const float longer = height * dot(hit.shading_normal, hit.normal_towards(direction)) /
-                       dot(direction, hit.normal_towards(direction));
+  const float longer = height * dot(hit.shading_normal, normal) / dot(direction, normal);
   return weight * std::clamp(longer, kShortest * t, kLongest * t);
 }
 
@@ -112,7 +113,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
   if (!several_bodies_) return 1;
   const Vec3 above = at.origin(side), below = at.origin(-side);
   if (!world_.tracer.collect({above, below - above, 0, 1}, all_, room.hits)) return 1;
-  find_crossings(above, sheet_at(at), (below - above).normalized(), room);
+  find_crossings(above, (below - above).normalized(), room);
   int depth = 0;
   for (const Crossing& crossing : room.crossings)
     if (world_.shape(crossing.hit).medium == medium_) depth += crossing.leaving ? -1 : 1;
@@ -121,8 +122,7 @@ int Interior::bodies_below(const SurfacePoint& at, float side, InteriorRoom& roo
 
 // Hits as crossings: distances from the true point, one for a ray through the edge of two faces, and where
 // bodies touch the next one entered before the last is left.
-void Interior::find_crossings(const Vec3& from, const SheetPoint& top, const Vec3& direction,
-                              InteriorRoom& room) const {
+void Interior::find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const {
   std::vector<Crossing>& crossings = room.crossings;
   crossings.clear();
   float last_reach = 0;  // within which distances are the same, for all that precision tells
@@ -131,8 +131,7 @@ void Interior::find_crossings(const Vec3& from, const SheetPoint& top, const Vec
     const float side = point.side(direction);
     const float cosine = std::max(std::abs(dot(point.geometric_normal, direction)), 1e-3f);
     const float reach = (point.origin(side) - point.position).length() / cosine;
-    const float t = distance_to_plane(from, direction, point);
-    const Crossing crossing{t, t + smoothing(top, direction, t, point), hit, point, side > 0};
+    const Crossing crossing{distance_to_plane(from, direction, point), hit, point, side > 0};
     const bool touches = !crossings.empty() && crossing.t - crossings.back().t <= std::max(reach, last_reach);
     last_reach = reach;
     if (touches && crossing.leaving == crossings.back().leaving &&
@@ -153,7 +152,7 @@ ViewSegment Interior::trace_view(const SurfacePoint& from, const Vec3& out, cons
   segment.first_origin = segment.last_origin = from.origin(-from.side(out));
   segment.depth = bodies_below(from, from.side(out), room);
   if (!world_.tracer.collect({segment.first_origin, direction}, all_, room.hits)) return segment;
-  find_crossings(from.position, segment.top, direction, room);
+  find_crossings(from.position, direction, room);
   int depth = segment.depth;
   for (const Crossing& crossing : room.crossings) {
     depth += crossing.leaving ? -1 : 1;
@@ -185,11 +184,11 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
     return true;
   });
   if (is_black(segment.transmittance)) return segment;
-  find_crossings(point.position, point.top, sample.direction, room);
+  find_crossings(point.position, sample.direction, room);
 
   LightSegment guess = segment;
   float open_since = 0;
-  if (sum_spans(room.crossings, point.depth, Overlap::kCounted, sample.direction, segment, open_since))
+  if (sum_spans(room.crossings, point, Overlap::kCounted, sample.direction, segment, open_since))
     return segment;
   if (!std::isinf(sample.distance) && box_.intersects(sample.point)) {  // the light is inside
     segment.length += sample.distance - open_since;
@@ -197,15 +196,15 @@ LightSegment Interior::trace_light(const InteriorPoint& point, const LightSample
   }
   // There is a hole: the way out was missed, and what looked like an overlap was the next bulge.
   guess.lost = true;
-  if (!sum_spans(room.crossings, point.depth, Overlap::kIgnored, sample.direction, guess, open_since))
+  if (!sum_spans(room.crossings, point, Overlap::kIgnored, sample.direction, guess, open_since))
     end_at_box(point.position, sample.direction, open_since, guess);
   return guess;
 }
 
 // Adds up the pieces between boundaries; false if the last one stays open, since distance `open_since`.
-bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap,
+bool Interior::sum_spans(const std::vector<Crossing>& crossings, const InteriorPoint& from, Overlap overlap,
                          const Vec3& direction, LightSegment& segment, float& open_since) const {
-  if (overlap == Overlap::kIgnored) depth = 1;
+  int depth = overlap == Overlap::kIgnored ? 1 : from.depth;
   bool last_entry = true;  // as the light goes: the one nearest to the point
   open_since = 0;
   for (const Crossing& crossing : crossings) {
@@ -215,10 +214,10 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
       continue;
     }
     const Vec3 normal = crossing.point.normal_towards(direction);
+    const float t = crossing.t + smoothing(from.top, direction, crossing.t, crossing.point, normal);
     if (crossing.leaving) {
       LightSegment piece;
-      enter_through(normal, surface_albedo(world_, crossing.hit, true), direction,
-                    crossing.smooth_t - open_since, piece);
+      enter_through(normal, surface_albedo(world_, crossing.hit, true), direction, t - open_since, piece);
       if (last_entry) {
         segment.direction = piece.direction;
         segment.cos_entry = piece.cos_entry;
@@ -230,7 +229,7 @@ bool Interior::sum_spans(const std::vector<Crossing>& crossings, int depth, Over
     } else {
       segment.transmittance *= surface_albedo(world_, crossing.hit, false) *
                                (1 - fresnel_reflectance(std::min(dot(normal, direction), 1.0f), eta_));
-      open_since = crossing.smooth_t;
+      open_since = t;
       depth = 1;
     }
   }

@@ -10,8 +10,7 @@ namespace nacre {
 
 /// A boundary on a straight way.
 struct Crossing {
-  float t;         // distance from where the way starts
-  float smooth_t;  // the same between the smooth surfaces that the meshes stand for
+  float t;  // distance from where the way starts
   Hit hit;
   SurfacePoint point;
   bool leaving;  // out of the body
@@ -78,11 +77,10 @@ class Interior {
 
  private:
   int bodies_below(const SurfacePoint& at, float side, InteriorRoom& room) const;
-  void find_crossings(const Vec3& from, const SheetPoint& top, const Vec3& direction,
-                      InteriorRoom& room) const;
+  void find_crossings(const Vec3& from, const Vec3& direction, InteriorRoom& room) const;
   enum class Overlap { kCounted, kIgnored };
-  bool sum_spans(const std::vector<Crossing>& crossings, int depth, Overlap overlap, const Vec3& direction,
-                 LightSegment& segment, float& open_since) const;
+  bool sum_spans(const std::vector<Crossing>& crossings, const InteriorPoint& from, Overlap overlap,
+                 const Vec3& direction, LightSegment& segment, float& open_since) const;
   void enter_through(const Vec3& normal, const Rgb& albedo, const Vec3& direction, float span,
                      LightSegment& segment) const;
   void end_at_box(const Vec3& point, const Vec3& direction, float open_since, LightSegment& segment) const;

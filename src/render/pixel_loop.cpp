@@ -77,31 +77,40 @@ std::uint64_t PixelLoop::pixel_key(std::uint32_t pixel, std::uint64_t purpose) c
   return hash_words(params_.seed, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y), purpose);
 }
 
-PixelLoop::CameraSample PixelLoop::camera_ray(std::uint32_t pixel, std::uint32_t sample) const {
-  const std::uint64_t key = pixel_key(pixel, 0), lens_key = hash_words(key, 1);
+PixelLoop::PixelStart PixelLoop::pixel_start(std::uint32_t pixel) const {
+  const std::uint64_t key = pixel_key(pixel, 0);
   const auto [x, y] = place(pixel);
-  const Vec2 centre(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  const FilterSample offset = filter_.sample(sobol_2d(sample, key));
-  return {camera_.at(centre + offset.offset, sobol_2d(sample, lens_key)), offset.weight};
+  return {{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f}, key, hash_words(key, 1)};
+}
+
+PixelLoop::CameraSample PixelLoop::camera_sample(const PixelStart& start, std::uint32_t sample) const {
+  const FilterSample offset = filter_.sample(sobol_2d(sample, start.key));
+  return {camera_.at(start.centre + offset.offset, sobol_2d(sample, start.lens_key)), offset.weight};
+}
+
+Hit PixelLoop::first_hit(std::uint32_t pixel) const {
+  return world_.tracer.intersect(camera_sample(pixel_start(pixel), 0).ray);
 }
 
 std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size_t end,
                                                     PixelBuffer& pixels) const {
   std::vector<Path> paths;
   paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
-  for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel)
+  for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
+    const PixelStart start = pixel_start(pixel);
     for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
-      const CameraSample start = camera_ray(pixel, sample);
+      const CameraSample seen = camera_sample(start, sample);
       Path path;
-      path.ray.ray = start.ray;
+      path.ray.ray = seen.ray;
       // Of a few samples the weights might hardly add up to anything.
-      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : start.weight;
+      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : seen.weight;
       path.throughput = Rgb(weight);
       pixels.weight[pixel] += weight;
       path.pixel = pixel;
       path.sample = sample;
       paths.push_back(path);
     }
+  }
   return paths;
 }
 

@@ -27,7 +27,7 @@ class PixelLoop {
   /// Adds the samples of pixels [begin, end) of the rendered rectangle, row by row.
   void render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const;
   /// What the first sample of a pixel sees.
-  Hit first_hit(std::uint32_t pixel) const { return world_.tracer.intersect(camera_ray(pixel, 0).ray); }
+  Hit first_hit(std::uint32_t pixel) const;
 
  private:
   // A ray on its way, what it is worth and which layer it adds to.
@@ -43,11 +43,17 @@ class PixelLoop {
     Hit hit;
   };
 
+  // What the samples of a pixel share.
+  struct PixelStart {
+    Vec2 centre;
+    std::uint64_t key, lens_key;
+  };
   struct CameraSample {
     Ray ray;
     float weight;  // of the filter
   };
-  CameraSample camera_ray(std::uint32_t pixel, std::uint32_t sample) const;
+  PixelStart pixel_start(std::uint32_t pixel) const;
+  CameraSample camera_sample(const PixelStart& start, std::uint32_t sample) const;
   std::array<int, 2> place(std::uint32_t pixel) const;
   std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
   std::vector<Path> start_paths(std::size_t begin, std::size_t end, PixelBuffer& pixels) const;

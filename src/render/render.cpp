@@ -104,19 +104,18 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
       media_[static_cast<std::size_t>(world_.shape(hits[i]).medium)].eval_exitance(
           std::span(hits).subspan(i, 1), std::span(values).subspan(i, 1), std::span(exact).subspan(i, 1));
   });
-  Verification result{hits.size(), 0, 0};
-  for (int k = 0; k < 3; ++k) {
-    double brightest = 0, error = 0, norm = 0;
-    for (const Rgb& value : exact) brightest = std::max(brightest, double{value[k]});
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      const double expected = double{exact[i][k]}, difference = std::abs(double{values[i][k]} - expected);
-      error += square(difference);
-      norm += square(expected);
-      if (expected > 1e-4 * brightest) result.largest = std::max(result.largest, difference / expected);
+  const auto as_image = [](const std::vector<Rgb>& radiances) {
+    Image image;
+    image.full_width = image.width = static_cast<int>(radiances.size());
+    image.full_height = image.height = 1;
+    for (int k = 0; k < 3; ++k) {
+      Channel& channel = image.channels.emplace_back(std::string(1, "RGB"[k]), std::vector<float>{});
+      for (const Rgb& radiance : radiances) channel.values.push_back(radiance[k]);
     }
-    if (norm > 0) result.relative_rmse = std::max(result.relative_rmse, std::sqrt(error / norm));
-  }
-  return result;
+    return image;
+  };
+  const ImageDifference difference = compare_images(as_image(values), as_image(exact), "");
+  return {hits.size(), difference.relative_rmse, difference.largest_relative};
 }
 
 }  // namespace nacre

@@ -33,7 +33,7 @@ class Exitance {
   /// Cells that are divided no further have sides of 2^`leaf_level` * kCellSpacings spacings of the samples.
   /// The default is for points about as dense as samples; where there are more, smaller cells are cheaper.
   static constexpr int kLeafLevel = 2;
-  /// The same for `points` all over the surface.
+  /// The cheapest level for `points` evenly spread over the surface.
   int leaf_level_for(double points) const noexcept;
   /// The same sum over every sample, in octree order.
   void eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
@@ -42,8 +42,8 @@ class Exitance {
   std::uint64_t cell_code(const Vec3& x) const noexcept;
 
  private:
-  static constexpr int kBlockLevels = 5;  // a block has 32 cells along each side
-
+  static constexpr double kCellSpacings = 0.75;  // side of the smallest cells
+  static constexpr int kBlockLevels = 5;         // a block has 32 of them along each side
   static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
 
   // A sample or a node as the inner loop reads it: position and share (0 for a node), then E_t A.
@@ -61,7 +61,6 @@ class Exitance {
   bool in_grid(const Vec3& x) const noexcept;
   Float4 guess(const Vec3& centre, std::uint64_t& evaluations) const noexcept;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
-  static constexpr double kCellSpacings = 0.75;
   Rgb sum(std::span<const Source> list, const Vec3& x) const noexcept;
 
   const CacheGroup& group_;
