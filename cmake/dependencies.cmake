@@ -1,7 +1,7 @@
 # Everything nacre is built from. What its static library is linked with is listed once, here, and found again
 # by an installed nacre's package file.
 set(NACRE_LINKED_PACKAGES
-  "embree 3 CONFIG" "OpenMesh CONFIG" "OpenEXR 3 CONFIG" "Imath 3 CONFIG" "TBB CONFIG" "fmt" "pugixml" "ZLIB")
+  "embree 3 CONFIG" "OpenMesh CONFIG" "OpenEXR 3 CONFIG" "Imath 3 CONFIG" "TBB CONFIG" "hwy CONFIG" "fmt" "pugixml" "ZLIB")
 set(NACRE_FIND_DEPENDENCIES "")
 # Debian's Imath reports at length that its Python bindings are not installed.
 set(CMAKE_MESSAGE_LOG_LEVEL NOTICE)

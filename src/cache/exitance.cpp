@@ -6,212 +6,161 @@
 
 #include "cache/local_expansion.h"
 #include "cache/morton.h"
-#include "nacre/base/parallel.h"
+#include "cache/sum_lanes.h"
 
 namespace nacre {
 namespace {
 
-// Deepest stack of a depth-first descent: seven siblings wait on each level.
-constexpr int kStackSize = 7 * (kMaxOctreeDepth + 1) + 8;
-
-// The estimate of a node's error takes all its samples to lie where the profile bends most and adds up errors
-// that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
-// shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
-// a relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 10;
-
-// The first guess opens nodes that are seen under more than this ratio of radius to distance.
-constexpr float kGuessRatio2 = 0.7f * 0.7f;
-
-// A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
-// share of the bound on its third derivatives.
-constexpr float kSeriesWeight = 0.2f;
+// Nodes are opened for the guess of a sum if seen under more than this ratio of radius to distance, and for
+// its lower bound.
+constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.35f;
 
 // Points per cell above which smaller ones are cheaper.
-constexpr double kPointsPerCell = 20;
-
-float distance2(const OctreeNode& node, const Vec3& x) noexcept {
-  const float dx = x.x - node.centre[0], dy = x.y - node.centre[1], dz = x.z - node.centre[2];
-  return dx * dx + dy * dy + dz * dz;
-}
-
-Float4 load(const float (&channels)[3]) noexcept { return Float4{channels[0], channels[1], channels[2], 0}; }
-
-bool is_dark(const OctreeNode& node) noexcept {
-  return node.power[0] == 0 && node.power[1] == 0 && node.power[2] == 0;
-}
-
-// Depth first, children in order; dark nodes are left out. `accept(node)` says that a node will do as it is;
-// otherwise its children are asked, or `leaf(node)` deals with its samples.
-template <class Accept, class Leaf>
-void descend(std::span<const OctreeNode> nodes, std::uint32_t from, const Accept& accept, const Leaf& leaf) {
-  std::uint32_t stack[kStackSize];
-  int top = 0;
-  stack[top++] = from;
-  while (top > 0) {
-    const OctreeNode& node = nodes[stack[--top]];
-    if (is_dark(node) || accept(node)) continue;
-    if (node.child_count() == 0)
-      leaf(node);
-    else
-      for (std::uint32_t c = node.child_count(); c-- > 0;) stack[top++] = node.first_child + c;
-  }
-}
+constexpr std::size_t kPointsPerCell = 16;
 
 }  // namespace
-
-Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance)
-    : group_(group),
-      sources_(group.size()),
-      kernel_(make_profiles(medium)),
-      allowance_(tolerance * kCalibration) {
-  if (group.size() == 0) return;
-  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
-  if (kernel_.singular()) {
-    const auto areas = group.plane(Plane::kArea);
-    nearest2_ = Kernel::disc_reach2(*std::max_element(areas.begin(), areas.end()));
-  }
-  const double spacing = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
-  Box3 box;
-  for (std::size_t i = 0; i < group.size(); ++i) box.extendBy(group.position(i));
-  const Vec3 size = box.size();
-  // Whole blocks around all samples, and no more than 2^20 cells an axis.
-  cell_size_ = std::max(kCellSpacings * spacing, 0x1p-20 * double{std::max({size.x, size.y, size.z})});
-  if (!(cell_size_ > 0)) cell_size_ = 1;
-  for (int axis = 0; axis < 3; ++axis)
-    origin_[axis] = (std::floor(double{box.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
-  parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 p = group.position(i);
-      const float area = group.area(i);
-      const Rgb power = group.irradiance(i) * area;
-      sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
-    }
-  });
-}
-
-std::uint64_t Exitance::cell_code(const Vec3& x) const noexcept {
-  std::uint64_t code = 0;
-  for (int axis = 0; axis < 3; ++axis)
-    code |= spread_bits(static_cast<std::uint64_t>(
-                std::clamp((static_cast<double>(x[axis]) - origin_[axis]) / cell_size_, 0.0, 0x1p21 - 1)))
-            << axis;
-  return code;
-}
-
-int Exitance::leaf_level_for(double points) const noexcept {
-  const double cells = group_.surface_area / square(cell_size_ * (1 << kLeafLevel));
-  const double finer = std::log(points / std::max(cells, 1.0) / kPointsPerCell) / std::log(4.0);
-  return std::clamp(kLeafLevel - static_cast<int>(std::lround(finer)), 0, kLeafLevel);
-}
-
-bool Exitance::in_grid(const Vec3& x) const noexcept {
-  const Vec3d offset = (Vec3d(x) - origin_) / cell_size_;
-  return std::min({offset.x, offset.y, offset.z}) >= 0 && std::max({offset.x, offset.y, offset.z}) < 0x1p21;
-}
 
 // A block (level kBlockLevels), a cell (level 0) or one between: what all its points share.
 struct Exitance::Target {
   Vec3 centre;
-  float radius;
-  LocalExpansion far;                  // of what is far from all of it
-  std::vector<std::uint32_t> pending;  // octree nodes that its parts deal with
+  float radius;       // of a ball around all its points
+  LocalExpansion far;  // of what is far from all of it
+  IndexList pending;   // octree nodes that its parts deal with
 };
 
 struct Exitance::Room {
   std::span<const Vec3> points;
   std::span<Rgb> exitance;
-  int leaf_level;
+  bool whole;
   std::array<Target, kBlockLevels + 1> targets;
-  std::vector<Source> list;
+  SortedNodes nodes;
+  SourceList list;
+  std::vector<float> as_point, in_series;  // limits of the target at hand
   std::uint64_t evaluations = 0;
 };
 
-// A first guess of the sum, from nodes seen under at most a fixed angle and from leaves as single points at
-// the distance of their rim, or of half a sample's disc from where R has no bound: good to a factor of two,
-// which is all that errors need to be measured against.
-Float4 Exitance::guess(const Vec3& centre, std::uint64_t& evaluations) const noexcept {
-  Float4 sum = broadcast(0);
-  const auto accept = [&](const OctreeNode& node) {
-    const float r2 = distance2(node, centre), radius2 = node.radius * node.radius;
-    if (radius2 > kGuessRatio2 * r2 && node.child_count() > 0) return false;
-    sum += kernel_.eval(std::max({r2, radius2, nearest2_ / 64})) * load(node.power);
-    ++evaluations;
-    return true;
-  };
-  descend(group_.nodes, 0, accept, [](const OctreeNode&) {});
-  return sum;
+void Exitance::place(Target& target, std::span<const Point> range, int level, const Room& room) const {
+  if (room.whole && level <= kWholeLevel) {
+    Box3 box;
+    for (const Point& point : range) box.extendBy(room.points[point.index]);
+    target.centre = box.center();
+    float radius2 = 0;
+    for (const Point& point : range)
+      radius2 = std::max(radius2, (room.points[point.index] - target.centre).length2());
+    target.radius = std::sqrt(radius2);
+  } else {
+    const double size = cell_size_ * static_cast<double>(1 << level);
+    for (int axis = 0; axis < 3; ++axis)
+      target.centre[axis] = static_cast<float>(
+          origin_[axis] +
+          (static_cast<double>(gather_bits(range[0].code >> axis) >> level) + 0.5) * size);
+    target.radius = static_cast<float>(size * std::sqrt(0.75));
+  }
+  // What rounding of positions, distances and roots may take away.
+  const Vec3& c = target.centre;
+  target.radius = 1.000001f * target.radius + 1e-6f * std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)});
+}
+
+// A guess of the sum at the target's centre, good to a factor of two, which is all that errors need to be
+// measured against; or, certified, a lower bound for all its points.
+Float4 Exitance::weigh(const Target& target, Room& room) const {
+  const bool certified = promise_ == Promise::kCertified;
+  const CoarseTest test{nodes_.data(), target.centre, certified ? kBoundRatio : kGuessRatio, certified,
+                        certified ? target.radius : nearest_ / 8};
+  Float4 total = broadcast(0);
+  room.nodes.work.clear();
+  room.nodes.work.push(0);
+  while (room.nodes.work.size() > 0) {
+    room.nodes.opened.clear();
+    room.evaluations += lanes::add_coarsely(kernel_.tables(), test, room.nodes, total);
+    room.nodes.work.clear();
+    for (const std::uint32_t index : room.nodes.opened.span())
+      for (std::uint32_t c = 0; c < nodes_[index].child_count(); ++c)
+        room.nodes.work.push(nodes_[index].first_child + c);
+  }
+  return total;
 }
 
 // Sums up for the points of one block or cell, which follow each other.
 void Exitance::eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const {
   Target& target = room.targets[static_cast<std::size_t>(level)];
-  const double size = cell_size_ * static_cast<double>(1 << level);
-  for (int axis = 0; axis < 3; ++axis)
-    target.centre[axis] = static_cast<float>(
-        origin_[axis] + (static_cast<double>(gather_bits(range[0].code >> axis) >> level) + 0.5) * size);
-  target.radius = static_cast<float>(size * std::sqrt(0.75));
+  place(target, range, level, room);
   target.far = parent ? parent->far.moved(target.centre - parent->centre) : LocalExpansion{};
   target.pending.clear();
+  const bool is_leaf =
+      level == 0 || (room.whole ? level <= kWholeLevel && range.size() <= kPointsPerCell : level <= kLeafLevel);
+
+  const Float4 total = weigh(target, room);
+  Rgb share(0, 0, 0);
+  const double factor = promise_ == Promise::kCertified ? allowance_ : 0.5 * allowance_;
+  for (int k = 0; k < 3; ++k)
+    if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * total[k] / nodes_[0].power[k];
+  const double classes =
+      std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
+  const Radius& radius = radii_[static_cast<std::size_t>(
+      std::clamp(classes, 0.0, static_cast<double>(radii_.size() - 1)))];
+  const std::array<const float*, 3> per_bend{per_bend_[0].data(), per_bend_[1].data(), per_bend_[2].data()};
+  const auto limits = [&](const std::array<std::vector<float>, 3>& channels, std::vector<float>& out) {
+    out.resize(lean_.size());
+    lanes::least_of_channels({channels[0].data(), channels[1].data(), channels[2].data()}, per_bend, share,
+                             out.size(), out.data());
+    out[0] = -1;
+  };
+  limits(radius.as_point, room.as_point);
+  limits(radius.in_series, room.in_series);
+
+  SortedNodes& nodes = room.nodes;
+  const NodeTest test{nodes_.data(),  target.centre,           target.radius,
+                      nearest_,       is_leaf,                 promise_ == Promise::kCertified,
+                      bins_,          lean_.data(),            room.as_point.data(),
+                      room.in_series.data()};
+  nodes.far.clear();
+  nodes.points.clear();
   room.list.clear();
-
-  // A node may err by the allowance times half its own contribution and half the whole sum's share of its
-  // power.
-  const Float4 total = guess(target.centre, room.evaluations);
-  const OctreeNode& root = group_.nodes[0];
-  const Float4 own = broadcast(static_cast<float>(0.5 * allowance_));
-  Float4 share = own * total;
-  for (int k = 0; k < 3; ++k) share[k] = root.power[k] > 0 ? share[k] / root.power[k] : 0.0f;
-  const Float4 half = broadcast(0.5f),
-               series = broadcast(kSeriesWeight * target.radius * target.radius * target.radius / 6);
-
-  const auto accept = [&](const OctreeNode& node) {
-    const Vec3 offset = target.centre - Vec3(node.centre[0], node.centre[1], node.centre[2]);
-    const float r2 = dot(offset, offset);
-    // From the point of the target that is nearest to the node's centre.
-    const float near = std::sqrt(r2) - target.radius;
-    if (near > node.radius && square(near - node.radius) > nearest2_) {
-      const Float4 power = load(node.power);
-      const Kernel::Bounds& bounds = kernel_.bounds(near * near);
-      const Float4 error =
-          half * load(node.second_moment) * bounds.hessian + load(node.first_moment) * bounds.slope;
-      const Float4 allowed = power * (own * kernel_.eval(r2) + share);
-      if (all_at_most(error + power * bounds.third * series, allowed)) {
-        target.far.add(power, kernel_.eval_jet(r2), offset);
-        ++room.evaluations;
-        return true;
-      }
-      if (all_at_most(error, allowed)) {
-        if (level == room.leaf_level)
-          room.list.push_back({node.centre[0], node.centre[1], node.centre[2], 0, power});
-        else
-          target.pending.push_back(static_cast<std::uint32_t>(&node - group_.nodes.data()));
-        return true;
-      }
-    }
-    // Smaller targets are further away.
-    if (level == room.leaf_level || (node.radius > target.radius && node.child_count() > 0)) return false;
-    target.pending.push_back(static_cast<std::uint32_t>(&node - group_.nodes.data()));
-    return true;
-  };
-  const auto leaf = [&](const OctreeNode& node) {
-    const auto first = sources_.begin() + node.first_sample;
-    room.list.insert(room.list.end(), first, first + node.sample_count());
-  };
   if (parent)
-    for (const std::uint32_t node : parent->pending) descend(group_.nodes, node, accept, leaf);
-  else
-    descend(group_.nodes, 0, accept, leaf);
+    nodes.work.assign(parent->pending.span());
+  else {
+    nodes.work.clear();
+    nodes.work.push(0);
+  }
+  while (nodes.work.size() > 0) {
+    nodes.opened.clear();
+    nodes.pending.clear();
+    lanes::sort_nodes(test, nodes);
+    nodes.work.clear();
+    for (const std::uint32_t index : nodes.opened.span()) {
+      const SumNode& node = nodes_[index];
+      if (node.child_count() > 0)
+        for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
+      else if (is_leaf)
+        room.list.add(std::span(sources_).subspan(node.first_sample, node.sample_count()));
+      else
+        target.pending.push(index);
+    }
+    for (const std::uint32_t index : nodes.pending.span()) target.pending.push(index);
+  }
+  lanes::add_series(kernel_.tables(), nodes_.data(), nodes.far.span(), target.centre, target.far);
+  room.evaluations += nodes.far.size();
 
-  if (level == room.leaf_level) {
+  if (is_leaf) {
+    for (const std::uint32_t index : nodes.points.span()) {
+      const SumNode& node = nodes_[index];
+      const SumSource source{node.x, node.y, node.z, 0, Float4{node.power[0], node.power[1], node.power[2], 0}};
+      room.list.add({&source, 1});
+    }
+    room.list.pad();
     for (const Point& point : range) {
       const Vec3& x = room.points[point.index];
       const Float4 far = target.far.eval(x - target.centre);
-      room.exitance[point.index] = sum(room.list, x) + Rgb(far[0], far[1], far[2]);
+      std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
+      lanes::add_sources(kernel_.tables(), room.list, x, sum);
+      for (int k = 0; k < 3; ++k)
+        room.exitance[point.index][k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
     }
     room.evaluations += room.list.size() * range.size();
     return;
   }
+  for (const std::uint32_t index : nodes.points.span()) target.pending.push(index);
   const int shift = 3 * (level - 1);
   for (std::size_t begin = 0; begin < range.size();) {
     std::size_t end = begin + 1;
@@ -221,26 +170,18 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   }
 }
 
-// Runs of one sign and of a few terms are kept by floats; the whole is added up in double precision.
-Rgb Exitance::sum(std::span<const Source> list, const Vec3& x) const noexcept {
-  constexpr std::size_t kRun = 64;
-  const bool singular = kernel_.singular();
-  double total[3]{};
-  for (std::size_t begin = 0; begin < list.size(); begin += kRun) {
-    Float4 part = broadcast(0);
-    for (const Source& s : list.subspan(begin, std::min(kRun, list.size() - begin))) {
-      const float dx = x.x - s.x, dy = x.y - s.y, dz = x.z - s.z;
-      const float r2 = dx * dx + dy * dy + dz * dz;
-      part += (singular ? kernel_.eval_disc(r2, s.area) : kernel_.eval(r2)) * s.power;
-    }
-    for (int k = 0; k < 3; ++k) total[k] += static_cast<double>(part[k]);
-  }
-  return {static_cast<float>(total[0]), static_cast<float>(total[1]), static_cast<float>(total[2])};
+void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const {
+  eval_points(points, exitance, evaluations, false);
 }
 
-void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
-                    int leaf_level) const {
-  if (allowance_ <= 0 || group_.nodes.empty()) return eval_exact(points, exitance, evaluations);
+void Exitance::eval_whole(std::span<const Vec3> points, std::span<Rgb> exitance,
+                          std::uint64_t& evaluations) const {
+  eval_points(points, exitance, evaluations, true);
+}
+
+void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
+                           bool whole) const {
+  if (nodes_.empty()) return eval_exact(points, exitance, evaluations);
   std::vector<Point> order;
   order.reserve(points.size());
   for (std::uint32_t i = 0; i < points.size(); ++i) {
@@ -249,11 +190,15 @@ void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::
     else  // far away from all samples, where no surface is
       eval_exact(points.subspan(i, 1), exitance.subspan(i, 1), evaluations);
   }
-  std::ranges::sort(order, {}, &Point::code);
-  Room room{points, exitance, leaf_level, {}, {}, 0};
+  std::ranges::sort(order, [](const Point& a, const Point& b) {
+    return a.code != b.code ? a.code < b.code : a.index < b.index;
+  });
+  Room room{points, exitance, whole, {}, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
-    while (end < order.size() && block_of(order[end].code) == block_of(order[begin].code)) ++end;
+    while (end < order.size() &&
+           order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)
+      ++end;
     eval_target(std::span(order).subspan(begin, end - begin), kBlockLevels, nullptr, room);
     begin = end;
   }
@@ -262,7 +207,19 @@ void Exitance::eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::
 
 void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
                           std::uint64_t& evaluations) const {
-  for (std::size_t i = 0; i < points.size(); ++i) exitance[i] = sum(sources_, points[i]);
+  constexpr std::size_t kChunk = 4096;
+  std::vector<std::array<double, 3>> totals(points.size());
+  SourceList list;
+  for (std::size_t begin = 0; begin < sources_.size(); begin += kChunk) {
+    list.clear();
+    list.add(std::span(sources_).subspan(begin, std::min(kChunk, sources_.size() - begin)));
+    list.pad();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      lanes::add_sources(kernel_.tables(), list, points[i], totals[i]);
+  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      exitance[i][k] = static_cast<float>(totals[i][static_cast<std::size_t>(k)]);
   evaluations += points.size() * sources_.size();
 }
 

@@ -209,8 +209,6 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
     }
   }
 
-  leaf_level_ = exitance.leaf_level_for(static_cast<double>(positions_.size()));
-
   // Nodes of one block side by side, in the order in which the sum is cheapest.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order(positions_.size());
   parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -260,7 +258,7 @@ void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint
     positions.insert(positions.end(), positions_.begin() + block_begin_[block],
                      positions_.begin() + block_begin_[block + 1]);
   std::vector<Rgb> values(positions.size());
-  exitance_.eval(positions, values, evaluations, leaf_level_);
+  exitance_.eval_whole(positions, values, evaluations);
   auto value = values.begin();
   for (const std::uint32_t block : blocks) {
     const auto count = static_cast<std::ptrdiff_t>(block_begin_[block + 1] - block_begin_[block]);

@@ -47,8 +47,10 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
     narrowest = std::min(narrowest, p.width);
     // Beyond 80 decay lengths exp underflows what a float can hold next to the centre's value; without
     // absorption R falls like r^-3 and what lies beyond 1e6 widths is some 1e-6 of the total.
-    for (const Profile::Term& t : p.terms)
+    for (const Profile::Term& t : p.terms) {
+      steepest_ = std::max(steepest_, t.sigma);
       widest = std::max(widest, t.sigma > 0 ? std::min(80 / t.sigma, 1e6 * p.width) : 1e6 * p.width);
+    }
   }
   if (widest == 0) narrowest = widest = 1;
   // The start is so near that a regular profile is flat there to the accuracy of the table.
@@ -125,6 +127,29 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
       previous = next;
     }
   }
+}
+
+KernelTables Kernel::tables() const noexcept {
+  static_assert(sizeof(Cell) == 8 * sizeof(float) && sizeof(JetCell) == 16 * sizeof(float));
+  const auto bins = [](std::uint32_t first, std::size_t count, int shift) {
+    return DistanceBins{static_cast<std::int32_t>(first),
+                        static_cast<std::int32_t>(first + count - 1), shift};
+  };
+  return {reinterpret_cast<const float*>(cells_.data()),
+          reinterpret_cast<const float*>(jets_.data()),
+          bins(first_cell_, cells_.size(), 23 - kCellBits),
+          bins(first_jet_, jets_.size(), 23 - kJetBits),
+          singular_,
+          disc_table().data(),
+          static_cast<float>(kDiscCells) / kDiscReach,
+          kDiscReach};
+}
+
+double Kernel::relative_error(float distance) const noexcept {
+  // As a function of s = r^2 the profile falls locally like a power, at most (3 + sigma r)/2, and over a cell
+  // of width h s a chord errs by at most h^2/8 of s^2 R''/R. A tenth is added for rounding of the cells' ends.
+  const double power = (3 + std::min(steepest_ * double{distance}, 80.0)) / 2;
+  return 1.1 * square(1.0 / (1 << kCellBits)) / 8 * power * (power + 1);
 }
 
 Float4 Kernel::eval_disc(float r2, float area) const noexcept {

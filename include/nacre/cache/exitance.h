@@ -12,64 +12,96 @@
 
 namespace nacre {
 
+/// A sample, or a node that stands for its samples, as the inner loops read it.
+struct SumSource {
+  float x, y, z, area;  // share of the surface, 0 for a node
+  Float4 power;         // E_t A
+};
+/// A node of the octree as they do.
+struct SumNode {
+  float x, y, z, radius;
+  float spread;   // largest over channels of half the second moment over the power; -1 for a dark node
+  float lean;     // the same of the first moment
+  float opening;  // radius, 0 for a leaf
+  float power[3];
+  std::uint32_t first_child, packed_counts, first_sample;
+  std::uint32_t child_count() const noexcept { return packed_counts >> 28; }
+  std::uint32_t sample_count() const noexcept { return packed_counts & 0x0fffffffu; }
+};
+
+/// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
+enum class Promise { kCalibrated, kCertified };
+
 /// One group of a cache seen with one material and one tolerance. M_o is a function of position and these
 /// alone. The cache has to outlive it.
 class Exitance {
  public:
-  /// `tolerance` is the relative error of the sum against eval_exact, as a relative RMSE over a picture; 0
-  /// sums every sample.
-  Exitance(const CacheGroup& group, const Medium& medium, double tolerance);
+  /// `tolerance` is the relative error of the sum against eval_exact; 0 sums every sample. Throws
+  /// Error(kLimit) where it cannot be certified, being near the accuracy of the tables.
+  Exitance(const CacheGroup& group, const Medium& medium, double tolerance,
+           Promise promise = Promise::kCalibrated);
 
   /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units. Space is divided into
   /// blocks, those into cells, down to a few distances of samples. A node of the octree stands for its
   /// samples, and its contribution to a block or cell is a Taylor series of second order around its centre,
-  /// where an estimate of both errors is small against the whole sum; what is too near for a block is left to
+  /// where a bound on both errors is small against the whole sum; what is too near for a block is left to
   /// its parts, and in a cell summed point by point. Blocks and cells are fixed in space, so that a point's
   /// value does not depend on its company; points that lie near each other are cheap. Counts evaluations of
   /// R_d in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy, Greengard & Rokhlin 1987 for the
-  /// expansions; the error estimates and the cells are nacre's own.
-  void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
-            int leaf_level = kLeafLevel) const;
-  /// Cells that are divided no further have sides of 2^`leaf_level` * kCellSpacings spacings of the samples.
-  /// The default is for points about as dense as samples; where there are more, smaller cells are cheaper.
-  static constexpr int kLeafLevel = 2;
-  /// The cheapest level for `points` evenly spread over the surface.
-  int leaf_level_for(double points) const noexcept;
+  /// expansions; the error bounds and the cells are nacre's own.
+  void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
+  /// The same for points that are all there will ever be in the cells of level kWholeLevel in which they lie:
+  /// the parts of those cells fit closely around them.
+  void eval_whole(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
   /// The same sum over every sample, in octree order.
   void eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
 
-  /// The cell of a point, in Morton order: points of one cell, and cells of one block, follow each other.
+  /// The cell of a point, in Morton order; shifted right by 3 bits a level, the larger cell around it.
   std::uint64_t cell_code(const Vec3& x) const noexcept;
+  static constexpr int kWholeLevel = 3;
 
  private:
   static constexpr double kCellSpacings = 0.75;  // side of the smallest cells
   static constexpr int kBlockLevels = 5;         // a block has 32 of them along each side
-  static std::uint64_t block_of(std::uint64_t cell_code) noexcept { return cell_code >> 3 * kBlockLevels; }
+  // Cells that are divided no further, for points about as dense as samples.
+  static constexpr int kLeafLevel = 2;
+  // Smallest tabulated radius of a target in cells, and steps.
+  static constexpr double kSmallestRadius = 0.125;
+  static constexpr int kRadiiPerOctave = 4;
 
-  // A sample or a node as the inner loop reads it: position and share (0 for a node), then E_t A.
-  struct Source {
-    float x, y, z, area;
-    Float4 power;
-  };
   struct Point {
     std::uint64_t code;
     std::uint32_t index;
   };
+  // What is tabulated for targets of one radius: how spread out a node may be, by bins of distance.
+  struct Radius {
+    std::array<std::vector<float>, 3> as_point, in_series;
+  };
   struct Target;
   struct Room;
 
+  void make_nodes();
+  void make_tables();
   bool in_grid(const Vec3& x) const noexcept;
-  Float4 guess(const Vec3& centre, std::uint64_t& evaluations) const noexcept;
+  void eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
+                   bool whole) const;
+  void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
+  Float4 weigh(const Target& target, Room& room) const;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
-  Rgb sum(std::span<const Source> list, const Vec3& x) const noexcept;
 
   const CacheGroup& group_;
-  std::vector<Source> sources_;
+  std::vector<SumSource> sources_;
+  std::vector<SumNode> nodes_;
   Kernel kernel_;
+  Promise promise_;
   double allowance_;
-  float nearest2_ = 0;     // squared distance within which samples are summed one by one
+  float nearest_ = 0;      // distance within which samples are summed one by one
   Vec3d origin_{0, 0, 0};  // corner of the first cell
   double cell_size_ = 1;
+  DistanceBins bins_{};
+  std::vector<Radius> radii_;                   // from the smallest cell on, kRadiiPerOctave each
+  std::array<std::vector<float>, 3> per_bend_;  // what a share of the sum allows, by channel
+  std::vector<float> lean_;                     // by bin, what the first moment counts against the spread
 };
 
 }  // namespace nacre

@@ -57,7 +57,7 @@ class ExitanceField {
   static std::uint64_t block_of_cell(std::uint64_t cell_code) noexcept {
     return cell_code >> 3 * kBlockLevel;
   }
-  static constexpr int kBlockLevel = 3;
+  static constexpr int kBlockLevel = Exitance::kWholeLevel;
 
   std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
@@ -66,7 +66,6 @@ class ExitanceField {
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
-  int leaf_level_ = 0;
   std::vector<std::uint32_t> first_triangle_;  // by mesh: where its triangles begin in parts_
   std::vector<std::uint32_t> parts_;           // a patch, or kSplitBit and a split
   std::vector<Patch> patches_;

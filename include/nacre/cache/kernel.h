@@ -12,6 +12,22 @@
 
 namespace nacre {
 
+/// Cells of distance by the bits of r^2 as a float: `shift` of them are dropped.
+struct DistanceBins {
+  std::int32_t first, last, shift;
+};
+
+/// A kernel's tables as the vector code reads them: cells of 8 floats (R of three channels and a spare, their
+/// differences to the next cell), of 16 (R'/r, differences, (R'' - R'/r)/r^2, differences).
+struct KernelTables {
+  const float *cells, *jets;
+  DistanceBins cell_bins, jet_bins;
+  bool singular;
+  const float* discs;  // mean of 1/|x - y| over the unit disc, by distance of x from its centre
+  float discs_per_radius;
+  float disc_reach;  // radii of a disc within which it differs from a point
+};
+
 /// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells.
 /// Linear interpolation within a cell is right to 8e-6 relative while sigma_tr r < 1 (there R falls at most
 /// like r^-3), and to 1.5e-4 of the value up to sigma_tr r = 15; it never errs below.
@@ -30,9 +46,13 @@ class Kernel {
   /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
   /// profiles (R_d of the others hardly varies over a sample's share).
   Float4 eval_disc(float r2, float area) const noexcept;
+  /// The largest relative error of `eval` up to a distance, which linear interpolation makes where the profile
+  /// falls like exp(-sigma_tr r) within a cell.
+  double relative_error(float distance) const noexcept;
   /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
   static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
   bool singular() const noexcept { return singular_; }
+  KernelTables tables() const noexcept;
 
   /// R with what its Taylor series around a point at squared distance `r2` takes: R'/r, and
   /// (R'' - R'/r)/r^2. As a function of x, R(|x|) has the gradient `radial` x and the Hessian
@@ -52,6 +72,11 @@ class Kernel {
     Float4 hessian, slope, third;
   };
   const Bounds& bounds(float r2) const noexcept { return bounds_[bound_index(r2)]; }
+  /// The cells of `bounds`, and the distance at which one begins.
+  DistanceBins bound_bins() const noexcept {
+    return {static_cast<std::int32_t>(first_bound_),
+            static_cast<std::int32_t>(first_bound_ + bounds_.size() - 1), 23 - kBoundBits};
+  }
 
  private:
   static constexpr int kCellBits = 8;   // cells per octave of r^2: 256
@@ -87,6 +112,7 @@ class Kernel {
   std::vector<JetCell> jets_;
   std::uint32_t first_cell_ = 0, first_bound_ = 0, first_jet_ = 0;
   bool singular_ = false;
+  double steepest_ = 0;  // largest sigma of a profile's exponentials
 };
 
 }  // namespace nacre

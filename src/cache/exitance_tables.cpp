@@ -1,0 +1,175 @@
+// What the hierarchical sum prepares for a material: nodes as its loops read them, and how spread out a node
+// may be at which distance.
+#include <algorithm>
+#include <cmath>
+
+#include "cache/morton.h"
+#include "nacre/base/error.h"
+#include "nacre/base/parallel.h"
+#include "nacre/cache/exitance.h"
+
+namespace nacre {
+namespace {
+
+// The estimate of a node's error takes all its samples to lie where the profile bends most and adds up errors
+// that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
+// shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
+// a relative RMSE over a picture, makes use of.
+constexpr double kCalibration = 10;
+
+// A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
+// share of the bound on its third derivatives.
+constexpr double kSeriesWeight = 0.2;
+
+// What single precision adds to a relative error: sums of 64 terms a lane, a few hundred of them a series.
+constexpr double kRounding = 3e-5;
+
+constexpr float kNoLimit = 1e30f;
+
+}  // namespace
+
+Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
+    : group_(group),
+      sources_(group.size()),
+      kernel_(make_profiles(medium)),
+      promise_(promise),
+      allowance_(tolerance * kCalibration) {
+  if (group.size() == 0) return;
+  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
+  if (kernel_.singular()) {
+    const auto areas = group.plane(Plane::kArea);
+    nearest_ = std::sqrt(Kernel::disc_reach2(*std::max_element(areas.begin(), areas.end())));
+  }
+  const double spacing = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
+  Box3 box;
+  for (std::size_t i = 0; i < group.size(); ++i) box.extendBy(group.position(i));
+  const Vec3 size = box.size();
+  // Whole blocks around all samples, and no more than 2^20 cells an axis.
+  cell_size_ = std::max(kCellSpacings * spacing, 0x1p-20 * double{std::max({size.x, size.y, size.z})});
+  if (!(cell_size_ > 0)) cell_size_ = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    origin_[axis] = (std::floor(double{box.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
+  parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 p = group.position(i);
+      const float area = group.area(i);
+      const Rgb power = group.irradiance(i) * area;
+      sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
+    }
+  });
+  if (!(tolerance > 0)) return;
+  if (promise == Promise::kCertified) {
+    const double tables = kernel_.relative_error(size.length()) + kRounding;
+    allowance_ = tolerance - tables;
+    if (!(allowance_ > tables))
+      fail(ErrorCode::kLimit, group.name,
+           "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of {:.1g} or more, "
+           "or --method exact",
+           tolerance, tables, 2 * tables);
+  }
+  make_nodes();
+  make_tables();
+}
+
+void Exitance::make_nodes() {
+  nodes_.resize(group_.nodes.size());
+  parallel_for(nodes_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const OctreeNode& from = group_.nodes[i];
+      SumNode& node = nodes_[i];
+      node = {from.centre[0], from.centre[1], from.centre[2], from.radius, -1, 0,
+              from.child_count() > 0 ? from.radius : 0.0f,
+              {from.power[0], from.power[1], from.power[2]},
+              from.first_child, from.packed_counts, from.first_sample};
+      for (int k = 0; k < 3; ++k)
+        if (from.power[k] > 0) {
+          // Rounded up by more than division and the bounds' product lose.
+          node.spread = std::max(node.spread, 0.5000003f * from.second_moment[k] / from.power[k]);
+          node.lean = std::max(node.lean, 1.0000005f * from.first_moment[k] / from.power[k]);
+        }
+    }
+  });
+}
+
+// A node as a point errs in channel k by at most P_k (spread H_k + lean S_k), where H and S bound second and
+// first derivatives; its series by P_k T_k radius^3 / 6 more. Allowed is P_k (own K_k + share_k), so that
+// spread + lean max(S/H) may be at most the least (own K_k + share_k [- T_k radius^3 / 6]) / H_k.
+void Exitance::make_tables() {
+  const DistanceBins all = kernel_.bound_bins();
+  const auto bin_of = [&](double distance) {
+    const auto r2 = static_cast<float>(std::clamp(square(distance), 1e-36, 1e36));
+    return std::clamp(std::bit_cast<std::int32_t>(r2) >> all.shift, all.first, all.last);
+  };
+  const double largest = cell_size_ * (1 << kBlockLevels);
+  Box3 box;
+  for (const OctreeNode& node : group_.nodes.first(1))
+    box = Box3(Vec3(node.centre[0], node.centre[1], node.centre[2]) - Vec3(node.radius),
+               Vec3(node.centre[0], node.centre[1], node.centre[2]) + Vec3(node.radius));
+  // The first bin holds all that is nearer and is never accepted.
+  bins_ = {bin_of(cell_size_ / 16), 0, all.shift};
+  bins_.last = std::max(bin_of(double{box.size().length()} + 4 * largest), bins_.first + 1);
+  const auto count = static_cast<std::size_t>(bins_.last - bins_.first + 1);
+  constexpr std::size_t kVector = 64;  // floats in the longest vector there is
+  const std::size_t padded = (count + kVector - 1) / kVector * kVector;
+  const auto edge2 = [&](std::size_t bin) {
+    return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
+  };
+  const bool certified = promise_ == Promise::kCertified;
+  const double own = certified ? 0 : 0.5 * allowance_;
+  const double weight = (certified ? 1 : kSeriesWeight) / 6;
+  const OctreeNode& root = group_.nodes[0];
+
+  lean_.assign(padded, 0);
+  for (auto& channel : per_bend_) channel.assign(padded, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Kernel::Bounds& bounds = kernel_.bounds(edge2(i));
+    for (int k = 0; k < 3; ++k)
+      if (root.power[k] > 0) {
+        const float hessian = std::max(bounds.hessian[k], 1 / kNoLimit);
+        per_bend_[static_cast<std::size_t>(k)][i] = 1 / hessian;
+        lean_[i] = std::max(lean_[i], std::min(bounds.slope[k] / hessian, kNoLimit));
+      }
+  }
+  const double smallest = cell_size_ * kSmallestRadius;
+  const int radii = 1 + static_cast<int>(std::ceil(kRadiiPerOctave * std::log2(largest / smallest)));
+  radii_.resize(static_cast<std::size_t>(radii));
+  parallel_for(radii_.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t j = begin; j < end; ++j) {
+      const double radius = smallest * std::exp2(static_cast<double>(j) / kRadiiPerOctave);
+      for (std::size_t k = 0; k < 3; ++k) {
+        auto &as_point = radii_[j].as_point[k], &in_series = radii_[j].in_series[k];
+        as_point.assign(padded, kNoLimit);
+        in_series.assign(padded, kNoLimit);
+        if (!(root.power[k] > 0)) continue;
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto channel = static_cast<int>(k);
+          const double there = std::sqrt(double{edge2(i + 1)}) + radius;
+          const double value = own * double{kernel_.eval(static_cast<float>(square(there)))[channel]};
+          const double series = weight * radius * radius * radius * double{kernel_.bounds(edge2(i)).third[channel]};
+          const auto limit = [&](double allowed) {
+            return static_cast<float>(
+                std::clamp(allowed * double{per_bend_[k][i]}, -double{kNoLimit}, double{kNoLimit}));
+          };
+          as_point[i] = limit(value);
+          in_series[i] = limit(value - series);
+        }
+      }
+    }
+  });
+}
+
+std::uint64_t Exitance::cell_code(const Vec3& x) const noexcept {
+  std::uint64_t code = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    code |= spread_bits(static_cast<std::uint64_t>(
+                std::clamp((static_cast<double>(x[axis]) - origin_[axis]) / cell_size_, 0.0, 0x1p21 - 1)))
+            << axis;
+  return code;
+}
+
+bool Exitance::in_grid(const Vec3& x) const noexcept {
+  const Vec3d offset = (Vec3d(x) - origin_) / cell_size_;
+  return std::min({offset.x, offset.y, offset.z}) >= 0 && std::max({offset.x, offset.y, offset.z}) < 0x1p21;
+}
+
+}  // namespace nacre

@@ -1,0 +1,105 @@
+// The inner loops of the hierarchical sum, for whatever vector instructions the processor has.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "cache/local_expansion.h"
+#include "nacre/cache/exitance.h"
+#include "nacre/cache/kernel.h"
+
+namespace nacre {
+
+/// Sources side by side, coordinate by coordinate, padded with dark ones to whole vectors.
+class SourceList {
+ public:
+  void clear() noexcept { size_ = 0; }
+  void add(std::span<const SumSource> sources);
+  std::size_t size() const noexcept { return size_; }
+  /// Has to be called between the last `add` and a sum.
+  void pad();
+
+  enum Field { kX, kY, kZ, kArea, kR, kG, kB, kFieldCount };
+  const float* field(Field f) const noexcept { return fields_[f].data(); }
+
+ private:
+  std::array<std::vector<float>, kFieldCount> fields_;
+  std::size_t size_ = 0;
+};
+
+/// Indices of nodes, written a vector at a time.
+class IndexList {
+ public:
+  std::size_t size() const noexcept { return size_; }
+  const std::uint32_t* data() const noexcept { return indices_.data(); }
+  std::span<const std::uint32_t> span() const noexcept { return {indices_.data(), size_}; }
+  void clear() noexcept { size_ = 0; }
+  void push(std::uint32_t index) {
+    if (size_ >= indices_.size()) indices_.resize(2 * size_ + 64);
+    indices_[size_++] = index;
+  }
+  void assign(std::span<const std::uint32_t> from) {
+    clear();
+    std::copy(from.begin(), from.end(), room(from.size()));
+    size_ = from.size();
+  }
+  /// Room for `count` more and for what a vector store may spill; `grow` says how many were written.
+  std::uint32_t* room(std::size_t count) {
+    if (indices_.size() < size_ + count + 64) indices_.resize(2 * (size_ + count) + 64);
+    return indices_.data() + size_;
+  }
+  void grow(std::size_t count) noexcept { size_ += count; }
+
+ private:
+  std::vector<std::uint32_t> indices_;
+  std::size_t size_ = 0;
+};
+
+/// How a target looks at nodes.
+struct NodeTest {
+  const SumNode* nodes;
+  Vec3 centre;        // of the target
+  float radius;       // of a ball around all its points
+  float nearest;      // within this distance samples are summed one by one
+  bool open_small;    // whether nodes smaller than the target are opened rather than left to its parts
+  bool certified;     // whether distances are to the nearest that a sample of the node may be
+  DistanceBins bins;  // of the tables below
+  const float* lean;  // what the first moment counts
+  const float* as_point;
+  const float* in_series;  // the largest spread that a point, a series may stand for
+};
+
+/// How the sum is guessed, or bounded from below.
+struct CoarseTest {
+  const SumNode* nodes;
+  Vec3 centre;
+  float ratio;     // of radius to distance above which nodes with children are opened
+  bool certified;  // whether samples are as far away as can be
+  float slack;     // then: how much further; else the least distance
+};
+
+/// Where the nodes of `work` belong, in order: `far`, a series is good enough; `points`, a point is; `pending`,
+/// left to the target's parts; `opened`, neither. Dark nodes are dropped.
+struct SortedNodes {
+  IndexList work, far, points, pending, opened;
+};
+
+namespace lanes {
+
+/// Adds sum R_d(|x - p|) P over a padded list to `total`.
+void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x, std::array<double, 3>& total);
+void sort_nodes(const NodeTest& test, SortedNodes& lists);
+/// Adds nodes as points to the Taylor series of a target.
+void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
+                const Vec3& centre, LocalExpansion& expansion);
+/// Adds R_d P of the nodes of `work` to `total`; those seen under too large an angle go to `opened`. Returns
+/// how many were added.
+std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
+                           Float4& total);
+/// out[i] = min over channels of a_k[i] + share_k b_k[i]; whole vectors are read and written.
+void least_of_channels(const std::array<const float*, 3>& a, const std::array<const float*, 3>& b,
+                       const Rgb& share, std::size_t count, float* out);
+
+}  // namespace lanes
+}  // namespace nacre
