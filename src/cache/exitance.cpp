@@ -16,7 +16,7 @@ namespace {
 constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.35f;
 
 // Points per cell above which smaller ones are cheaper.
-constexpr std::size_t kPointsPerCell = 16;
+constexpr std::size_t kPointsPerCell = 32;
 
 }  // namespace
 
@@ -116,6 +116,8 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
                       room.in_series.data()};
   nodes.far.clear();
   nodes.points.clear();
+  nodes.samples.clear();
+  nodes.far_samples.clear();
   room.list.clear();
   if (parent)
     nodes.work.assign(parent->pending.span());
@@ -124,23 +126,33 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     nodes.work.push(0);
   }
   while (nodes.work.size() > 0) {
+    nodes.scattered.clear();
     nodes.opened.clear();
     nodes.pending.clear();
     lanes::sort_nodes(test, nodes);
     nodes.work.clear();
+    for (const std::uint32_t index : nodes.scattered.span()) {
+      const SumNode& node = nodes_[index];
+      for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
+      if (node.child_count() == 0)
+        for (std::uint32_t i = 0; i < node.sample_count(); ++i)
+          nodes.far_samples.push(node.first_sample + i);
+    }
     for (const std::uint32_t index : nodes.opened.span()) {
       const SumNode& node = nodes_[index];
       if (node.child_count() > 0)
         for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
       else if (is_leaf)
-        room.list.add(std::span(sources_).subspan(node.first_sample, node.sample_count()));
+        for (std::uint32_t i = 0; i < node.sample_count(); ++i) nodes.samples.push(node.first_sample + i);
       else
         target.pending.push(index);
     }
     for (const std::uint32_t index : nodes.pending.span()) target.pending.push(index);
   }
+  if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
   lanes::add_series(kernel_.tables(), nodes_.data(), nodes.far.span(), target.centre, target.far);
-  room.evaluations += nodes.far.size();
+  lanes::add_series(kernel_.tables(), sources_.data(), nodes.far_samples.span(), target.centre, target.far);
+  room.evaluations += nodes.far.size() + nodes.far_samples.size();
 
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {

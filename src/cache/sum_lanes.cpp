@@ -19,8 +19,6 @@ using U = hn::RebindToUnsigned<F>;
 using VF = hn::Vec<F>;
 using VI = hn::Vec<I>;
 
-constexpr int kNodeFloats = sizeof(SumNode) / sizeof(float);
-
 // Where a distance lies in a table: the cell times `stride`, and the fraction of it.
 HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
   const I di;
@@ -101,18 +99,22 @@ HWY_INLINE Batch load_batch(const std::uint32_t* indices, std::size_t i, std::si
   return {hn::Load(du, rest), hn::FirstN(df, count - i)};
 }
 
-struct NodeFields {
+// Gathers one field of structures of floats at a time.
+struct Fields {
   const float* first;
   VI offset;
   HWY_INLINE VF operator()(int field) const { return hn::GatherIndex(F(), first + field, offset); }
 };
-HWY_INLINE NodeFields gather_nodes(const SumNode* nodes, hn::Vec<U> index) {
+template <class Struct>
+HWY_INLINE Fields gather(const Struct* structs, hn::Vec<U> index) {
   const I di;
-  return {reinterpret_cast<const float*>(nodes),
-          hn::Mul(hn::BitCast(di, index), hn::Set(di, kNodeFloats))};
+  return {reinterpret_cast<const float*>(structs),
+          hn::Mul(hn::BitCast(di, index), hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
 }
 // The fields of a SumNode, float by float.
 enum NodeField { kNodeX, kNodeY, kNodeZ, kNodeRadius, kNodeSpread, kNodeLean, kNodeOpening, kNodePower };
+// And of a SumSource.
+enum SourceField { kSourceX, kSourceY, kSourceZ, kSourceArea, kSourcePower };
 
 HWY_INLINE void append(IndexList& list, std::uint32_t* room, hn::Vec<U> index, hn::Mask<F> mask) {
   const U du;
@@ -125,7 +127,7 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
   for (std::size_t i = 0; i < count; i += lanes) {
     const Batch batch = load_batch(lists.work.data(), i, count);
-    const NodeFields node = gather_nodes(test.nodes, batch.index);
+    const Fields node = gather(test.nodes, batch.index);
     const VF r2 = length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz));
     const VF radius = node(kNodeRadius), spread = node(kNodeSpread);
     // From the point of the target that is nearest to the node.
@@ -139,18 +141,48 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const auto far = hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.in_series, bin)));
     const auto point = hn::AndNot(far, hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.as_point, bin))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
+    const VI rim_bin = find_cell(test.bins, hn::Mul(to_rim, to_rim));
+    const auto scattered =
+        hn::And(hn::And(rest, apart), hn::Ge(hn::GatherIndex(df, test.in_series, rim_bin), hn::Zero(df)));
+    const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
-        test.open_small ? rest : hn::And(rest, hn::Gt(radius, hn::Set(df, test.radius)));
+        test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
+    append(lists.scattered, lists.scattered.room(lanes), batch.index, scattered);
     append(lists.far, lists.far.room(lanes), batch.index, far);
     append(lists.points, lists.points.room(lanes), batch.index, point);
     append(lists.opened, lists.opened.room(lanes), batch.index, opened);
     if (!test.open_small)
-      append(lists.pending, lists.pending.room(lanes), batch.index, hn::AndNot(opened, rest));
+      append(lists.pending, lists.pending.room(lanes), batch.index, hn::AndNot(opened, near_rest));
   }
 }
 
-void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
-                const Vec3& centre, LocalExpansion& expansion) {
+void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
+  const F df;
+  const std::size_t lanes = hn::Lanes(df), count = lists.samples.size();
+  const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
+  for (std::size_t i = 0; i < count; i += lanes) {
+    const Batch batch = load_batch(lists.samples.data(), i, count);
+    const Fields source = gather(sources, batch.index);
+    const VF x = source(kSourceX), y = source(kSourceY), z = source(kSourceZ);
+    const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
+    const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
+    const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
+    const auto far = hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
+                             hn::Ge(hn::GatherIndex(df, test.in_series, bin), hn::Zero(df)));
+    append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
+    near.reserve(lanes);
+    const auto here = hn::AndNot(far, batch.valid);
+    const VF values[] = {x, y, z, source(kSourceArea), source(kSourcePower), source(kSourcePower + 1),
+                         source(kSourcePower + 2)};
+    for (int f = 0; f < SourceList::kFieldCount; ++f)
+      hn::CompressStore(values[f], here, df, near.end(static_cast<SourceList::Field>(f)));
+    near.grow(hn::CountTrue(df, here));
+  }
+}
+
+template <int kPower, class Struct>
+HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs, std::span<const std::uint32_t> far,
+                            const Vec3& centre, LocalExpansion& expansion) {
   const F df;
   const std::size_t lanes = hn::Lanes(df);
   const VF cx = hn::Set(df, centre.x), cy = hn::Set(df, centre.y), cz = hn::Set(df, centre.z);
@@ -159,15 +191,15 @@ void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<cons
     for (VF& sum : channel) sum = hn::Zero(df);
   for (std::size_t i = 0; i < far.size(); i += lanes) {
     const Batch batch = load_batch(far.data(), i, far.size());
-    const NodeFields node = gather_nodes(nodes, batch.index);
-    const VF x = hn::Sub(cx, node(kNodeX)), y = hn::Sub(cy, node(kNodeY)), z = hn::Sub(cz, node(kNodeZ));
+    const Fields source = gather(structs, batch.index);
+    const VF x = hn::Sub(cx, source(0)), y = hn::Sub(cy, source(1)), z = hn::Sub(cz, source(2));
     const VF r2 = length2(x, y, z);
     const VI cell = hn::ShiftLeft<3>(find_cell(kernel.cell_bins, r2));
     const VF fraction = find_fraction(kernel.cell_bins, r2);
     const VI jet = hn::ShiftLeft<4>(find_cell(kernel.jet_bins, r2));
     const VF jet_fraction = find_fraction(kernel.jet_bins, r2);
     for (int k = 0; k < 3; ++k) {
-      const VF power = hn::IfThenElseZero(batch.valid, node(kNodePower + k));
+      const VF power = hn::IfThenElseZero(batch.valid, source(kPower + k));
       const VF value = interpolate(kernel.cells + k, cell, fraction);
       const VF radial = hn::Mul(power, interpolate(kernel.jets + k, jet, jet_fraction));
       const VF bend = hn::Mul(power, interpolate(kernel.jets + 8 + k, jet, jet_fraction));
@@ -193,6 +225,15 @@ void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<cons
   }
 }
 
+void add_node_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
+                     const Vec3& centre, LocalExpansion& expansion) {
+  add_structs<kNodePower>(kernel, nodes, far, centre, expansion);
+}
+void add_sample_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,
+                       const Vec3& centre, LocalExpansion& expansion) {
+  add_structs<kSourcePower>(kernel, sources, far, centre, expansion);
+}
+
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total) {
   const F df;
@@ -202,7 +243,7 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
   std::uint64_t added = 0;
   for (std::size_t i = 0; i < count; i += lanes) {
     const Batch batch = load_batch(lists.work.data(), i, count);
-    const NodeFields node = gather_nodes(test.nodes, batch.index);
+    const Fields node = gather(test.nodes, batch.index);
     const VF radius = node(kNodeRadius);
     const VF r = hn::Sqrt(
         length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz)));
@@ -244,9 +285,13 @@ namespace nacre {
 // Floats in the longest vector of any target.
 constexpr std::size_t kLongest = 64;
 
+void SourceList::reserve(std::size_t count) {
+  if (fields_[0].size() < size_ + count + kLongest)
+    for (auto& field : fields_) field.resize(2 * (size_ + count + kLongest));
+}
+
 void SourceList::add(std::span<const SumSource> sources) {
-  if (fields_[0].size() < size_ + sources.size() + kLongest)
-    for (auto& field : fields_) field.resize(2 * (size_ + sources.size() + kLongest));
+  reserve(sources.size());
   for (const SumSource& s : sources) {
     const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area, s.power[0], s.power[1], s.power[2]};
     for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
@@ -265,7 +310,9 @@ namespace lanes {
 
 HWY_EXPORT(add_sources);
 HWY_EXPORT(sort_nodes);
-HWY_EXPORT(add_series);
+HWY_EXPORT(sort_samples);
+HWY_EXPORT(add_node_series);
+HWY_EXPORT(add_sample_series);
 HWY_EXPORT(add_coarsely);
 HWY_EXPORT(least_of_channels);
 
@@ -275,7 +322,14 @@ void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3&
 void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH(sort_nodes)(test, lists); }
 void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                 const Vec3& centre, LocalExpansion& expansion) {
-  HWY_DYNAMIC_DISPATCH(add_series)(kernel, nodes, far, centre, expansion);
+  HWY_DYNAMIC_DISPATCH(add_node_series)(kernel, nodes, far, centre, expansion);
+}
+void add_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,
+                const Vec3& centre, LocalExpansion& expansion) {
+  HWY_DYNAMIC_DISPATCH(add_sample_series)(kernel, sources, far, centre, expansion);
+}
+void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
+  HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
 }
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total) {

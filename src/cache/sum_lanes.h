@@ -16,12 +16,16 @@ class SourceList {
  public:
   void clear() noexcept { size_ = 0; }
   void add(std::span<const SumSource> sources);
+  /// Room for `count` more and for what a vector store may spill; `grow` says how many were written.
+  void reserve(std::size_t count);
+  void grow(std::size_t count) noexcept { size_ += count; }
   std::size_t size() const noexcept { return size_; }
   /// Has to be called between the last `add` and a sum.
   void pad();
 
   enum Field { kX, kY, kZ, kArea, kR, kG, kB, kFieldCount };
   const float* field(Field f) const noexcept { return fields_[f].data(); }
+  float* end(Field f) noexcept { return fields_[f].data() + size_; }
 
  private:
   std::array<std::vector<float>, kFieldCount> fields_;
@@ -79,10 +83,12 @@ struct CoarseTest {
   float slack;     // then: how much further; else the least distance
 };
 
-/// Where the nodes of `work` belong, in order: `far`, a series is good enough; `points`, a point is; `pending`,
-/// left to the target's parts; `opened`, neither. Dark nodes are dropped.
+/// Where the nodes of `work` belong: `far`, a series is good enough; `points`, a point is; `scattered`, it is
+/// for each of their samples; `opened`, none of these; `pending`, neither, but they are left to the target's
+/// parts. Dark nodes are dropped.
 struct SortedNodes {
-  IndexList work, far, points, pending, opened;
+  IndexList work, far, points, scattered, opened, pending;
+  IndexList samples, far_samples;  // of opened leaves, and those that a series is good enough for
 };
 
 namespace lanes {
@@ -90,8 +96,12 @@ namespace lanes {
 /// Adds sum R_d(|x - p|) P over a padded list to `total`.
 void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x, std::array<double, 3>& total);
 void sort_nodes(const NodeTest& test, SortedNodes& lists);
-/// Adds nodes as points to the Taylor series of a target.
+/// The same for `samples`: `far_samples`, or the list.
+void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near);
+/// Adds nodes as points, samples, to the Taylor series of a target.
 void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
+                const Vec3& centre, LocalExpansion& expansion);
+void add_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,
                 const Vec3& centre, LocalExpansion& expansion);
 /// Adds R_d P of the nodes of `work` to `total`; those seen under too large an angle go to `opened`. Returns
 /// how many were added.

@@ -49,14 +49,20 @@ PixelLoop::PixelLoop(const World& world, const std::vector<Translucency>& media,
 }
 
 void PixelLoop::render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const {
-  std::vector<Path> paths = start_paths(begin, end, pixels);
-  std::vector<Path> next;
+  std::vector<Path> paths, next;
+  {
+    const StageClock clock(totals.surface);
+    paths = start_paths(begin, end, pixels);
+  }
   for (int wave = 0; wave < wave_limit_ && !paths.empty(); ++wave) {
     {
       const StageClock clock(wave == 0 ? totals.primary : totals.surface);
       for (Path& path : paths) path.hit = world_.tracer.intersect(path.ray.ray);
-      if (wave == 0) record_first_hits(paths, pixels);
-      totals.rays += paths.size();
+    }
+    totals.rays += paths.size();
+    if (wave == 0) {
+      const StageClock clock(totals.surface);
+      record_first_hits(paths, pixels);
     }
     add_translucency(paths, wave, pixels, totals);
     const StageClock clock(totals.surface);
@@ -143,7 +149,7 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
         pixels.add(wave == 0 ? layer : hits[i]->layer, hits[i]->pixel, hits[i]->throughput * radiance[i]);
     };
     {
-      const StageClock clock(totals.diffusion);
+      const StageClock clock(totals.surface);
       for (const Path& path : paths) {
         if (!path.hit || path.depth >= depth_limit_ || world_.shape(path.hit).medium != static_cast<int>(m))
           continue;
@@ -154,11 +160,14 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
              path.sample});
       }
       radiance.assign(points.size(), Rgb(0, 0, 0));
+      totals.shading_points += points.size();
+    }
+    {
+      const StageClock clock(totals.diffusion);
       std::uint64_t evaluations = 0;
       medium.eval_diffusion(points, radiance, evaluations);
       add(Layer::kDiffusion);
       totals.evaluations += evaluations;
-      totals.shading_points += points.size();
     }
     if (!medium.has_single_scattering()) continue;
     const StageClock clock(totals.single);

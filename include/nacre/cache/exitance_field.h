@@ -39,7 +39,10 @@ class ExitanceField {
 
   /// M_o at hits of those meshes. Adds to `evaluations` those that nodes took.
   void eval(std::span<const Hit> hits, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
+  /// Evaluates all nodes that are not yet known.
+  void fill(std::uint64_t& evaluations) const;
   std::size_t node_count() const { return positions_.size(); }
+  std::size_t filled_node_count() const;
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -51,28 +54,29 @@ class ExitanceField {
   struct Split {
     std::uint32_t first, pattern;
   };
-  class Builder;
+  struct Division;
+  class Divider;
 
-  // What is filled at once has sides of 6 sample distances.
-  static std::uint64_t block_of_cell(std::uint64_t cell_code) noexcept {
-    return cell_code >> 3 * kBlockLevel;
-  }
-  static constexpr int kBlockLevel = Exitance::kWholeLevel;
-
+  void divide_meshes(double distance);
+  void make_blocks();
   std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
+  Patch patch(std::uint32_t index) const noexcept;
+  void await_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   bool is_steep(const Patch& patch) const noexcept;
   Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
-  std::vector<std::uint32_t> first_triangle_;  // by mesh: where its triangles begin in parts_
-  std::vector<std::uint32_t> parts_;           // a patch, or kSplitBit and a split
-  std::vector<Patch> patches_;
+  std::vector<std::uint32_t> first_triangle_;  // by mesh, and the end
+  std::vector<std::array<std::uint32_t, 3>> corners_;  // of triangles, as nodes
+  std::vector<std::uint32_t> parts_;  // by triangle, then parts of splits: a patch or kSplitBit and a split
+  std::vector<Patch> patches_;        // their numbers follow those of the triangles that are whole patches
   std::vector<Split> splits_;
-  std::vector<Vec3> positions_;             // of nodes, block by block
+  std::vector<Vec3> positions_;             // of nodes: vertices mesh by mesh, then those on edges
   std::vector<std::uint32_t> block_of_;     // by node
-  std::vector<std::uint32_t> block_begin_;  // first node of each block, and the end
+  std::vector<std::uint32_t> block_begin_;  // first of each block in block_nodes_, and the end
+  std::vector<std::uint32_t> block_nodes_;
   mutable std::vector<Rgb> values_;         // of nodes
   std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_state_;
 };

@@ -1,0 +1,262 @@
+// Division of triangles into patches, and of their nodes into blocks of space.
+#include <algorithm>
+#include <bit>
+
+#include "cache/patch_split.h"
+#include "nacre/base/parallel.h"
+#include "nacre/cache/exitance_field.h"
+
+namespace nacre {
+namespace {
+
+// Triangles that are divided side by side.
+constexpr std::size_t kRun = 8192;
+
+// Numbers for keys in the order of their first appearance: open addressing.
+template <class Key, class Hash>
+class Numbering {
+ public:
+  std::uint32_t find_or_add(const Key& key) {
+    if (2 * keys_.size() >= slots_.size()) grow();
+    std::size_t slot = Hash()(key) & (slots_.size() - 1);
+    for (; slots_[slot] != kFree; slot = (slot + 1) & (slots_.size() - 1))
+      if (keys_[slots_[slot]] == key) return slots_[slot];
+    slots_[slot] = static_cast<std::uint32_t>(keys_.size());
+    keys_.push_back(key);
+    return slots_[slot];
+  }
+  const std::vector<Key>& keys() const { return keys_; }
+
+ private:
+  static constexpr std::uint32_t kFree = 0xffffffffu;
+  void grow() {
+    slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kFree);
+    for (std::uint32_t i = 0; i < keys_.size(); ++i) {
+      std::size_t slot = Hash()(keys_[i]) & (slots_.size() - 1);
+      while (slots_[slot] != kFree) slot = (slot + 1) & (slots_.size() - 1);
+      slots_[slot] = i;
+    }
+  }
+  std::vector<std::uint32_t> slots_;
+  std::vector<Key> keys_;
+};
+
+std::uint64_t mix(std::uint64_t h) noexcept {
+  h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;
+  h = (h ^ h >> 32) * 0xd6e8feb86659fd93ull;
+  return h ^ h >> 32;
+}
+struct HashPosition {
+  std::size_t operator()(const Vec3& p) const noexcept {
+    // + 0: -0 is 0.
+    const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x + 0.0f)}; };
+    return mix((bits(p.x) << 32 | bits(p.y)) * 0x9e3779b97f4a7c15ull + bits(p.z));
+  }
+};
+struct HashCode {
+  std::size_t operator()(std::uint64_t code) const noexcept { return mix(code); }
+};
+
+}  // namespace
+
+// What a run of triangles is divided into; nodes from `vertices` on, patches, splits and parts are numbered
+// within the run.
+struct ExitanceField::Division {
+  std::size_t begin, end;  // triangles
+  std::vector<std::uint32_t> parts, parts_of_splits;
+  std::vector<Patch> patches;
+  std::vector<Split> splits;
+  std::vector<Vec3> positions;
+};
+
+// Divides triangles until no edge is too long.
+class ExitanceField::Divider {
+ public:
+  Divider(std::span<const Vec3> vertices, double distance, Division& into)
+      : vertices_(vertices),
+        longest2_(static_cast<float>(square(distance))),
+        straight2_(static_cast<float>(square(distance / 3))),
+        into_(into) {}
+
+  // The part for triangle `index` with these corners.
+  std::uint32_t divide_triangle(std::uint32_t index, const Triangle& t) {
+    float longest2 = 0;
+    for (std::size_t i = 0; i < 3; ++i) longest2 = std::max(longest2, length2(t[i], t[(i + 1) % 3]));
+    return longest2 > straight2_ ? divide(t, 0) : index;
+  }
+  void end() { into_.positions = extras_.keys(); }
+
+ private:
+  Vec3 at(std::uint32_t node) const {
+    return node < vertices_.size() ? vertices_[node] : extras_.keys()[node - vertices_.size()];
+  }
+  float length2(std::uint32_t a, std::uint32_t b) const { return (at(a) - at(b)).length2(); }
+  // The same bits from both ends.
+  std::uint32_t middle(std::uint32_t a, std::uint32_t b) {
+    return static_cast<std::uint32_t>(vertices_.size()) + extras_.find_or_add((at(a) + at(b)) * 0.5f);
+  }
+
+  // Patches are numbered from kWhole on, below are triangles that need no division.
+  std::uint32_t divide(const Triangle& t, int depth) {
+    std::array<float, 3> edges2;
+    for (std::size_t i = 0; i < 3; ++i) edges2[i] = length2(t[i], t[(i + 1) % 3]);
+    // Coordinates too coarse for the distance of nodes have no middle between them.
+    constexpr int kDeepest = 40;
+    const auto is_long = [&](std::size_t i) { return edges2[i] > longest2_ && depth < kDeepest; };
+    const int count = is_long(0) + is_long(1) + is_long(2);
+    if (count == 0) {
+      Patch patch;
+      for (std::size_t i = 0; i < 3; ++i) {
+        patch.nodes[i] = t[i];
+        patch.nodes[3 + i] = edges2[i] > straight2_ ? middle(t[i], t[(i + 1) % 3]) : kNone;
+      }
+      into_.patches.push_back(patch);
+      return kPatchBit | static_cast<std::uint32_t>(into_.patches.size() - 1);
+    }
+    std::uint32_t turn = 0;
+    if (count == 1)
+      while (!is_long(turn)) ++turn;
+    if (count == 2)
+      while (is_long((turn + 1) % 3)) ++turn;
+    const std::uint32_t a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
+    std::array<Triangle, 4> pieces;
+    std::uint32_t pattern = kThreeEdges;
+    if (count == 1) {
+      const std::uint32_t ab = middle(a, b);
+      pattern = kOneEdge;
+      pieces = {{{a, ab, c}, {ab, b, c}}};
+    } else if (count == 2) {
+      const std::uint32_t ab = middle(a, b), ca = middle(c, a);
+      const bool other = length2(b, ca) < length2(ab, c);
+      pattern = other ? kTwoEdgesOther : kTwoEdges;
+      pieces = {{{a, ab, ca}, {ab, b, c}, {ab, c, ca}}};
+      if (other) pieces = {{{a, ab, ca}, {b, c, ca}, {ab, b, ca}}};
+    } else {
+      const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      pieces = {{{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {bc, ca, ab}}};
+    }
+    pattern |= turn << kTurnShift;
+    const auto split = static_cast<std::uint32_t>(into_.splits.size());
+    into_.splits.push_back({});
+    std::array<std::uint32_t, 4> made{};
+    for (std::uint32_t i = 0; i < part_count(pattern); ++i) made[i] = divide(pieces[i], depth + 1);
+    into_.splits[split] = {static_cast<std::uint32_t>(into_.parts_of_splits.size()), pattern};
+    into_.parts_of_splits.insert(into_.parts_of_splits.end(), made.begin(), made.begin() + part_count(pattern));
+    return kSplitBit | split;
+  }
+
+  std::span<const Vec3> vertices_;
+  float longest2_, straight2_;
+  Division& into_;
+  Numbering<Vec3, HashPosition> extras_;
+};
+
+double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double distance) {
+  double nodes = 0;
+  for (const Mesh* const mesh : meshes)
+    if (mesh) {
+      double longest = 0;  // slivers
+      for (const Triangle& t : mesh->triangles)
+        for (std::size_t i = 0; i < 3; ++i)
+          longest += double{(mesh->positions[t[i]] - mesh->positions[t[(i + 1) % 3]]).length()};
+      nodes += static_cast<double>(mesh->triangles.size()) + 2 * longest / distance +
+               10 * surface_area(*mesh) / square(distance);
+    }
+  return nodes;
+}
+
+ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance)
+    : exitance_(exitance), meshes_(std::move(meshes)) {
+  std::size_t triangles = 0, vertices = 0;
+  for (const Mesh* const mesh : meshes_) {
+    first_triangle_.push_back(static_cast<std::uint32_t>(triangles));
+    if (mesh) triangles += mesh->triangles.size(), vertices += mesh->positions.size();
+  }
+  corners_.resize(triangles);
+  positions_.reserve(2 * vertices);
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (!meshes_[m]) continue;
+    const auto first = static_cast<std::uint32_t>(positions_.size());
+    positions_.insert(positions_.end(), meshes_[m]->positions.begin(), meshes_[m]->positions.end());
+    const std::vector<Triangle>& from = meshes_[m]->triangles;
+    parallel_for(from.size(), kRun, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        corners_[first_triangle_[m] + i] = {first + from[i][0], first + from[i][1], first + from[i][2]};
+    });
+  }
+  divide_meshes(distance);
+  make_blocks();
+  values_.resize(positions_.size());
+  block_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(block_begin_.size());
+  patch_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(corners_.size() + patches_.size());
+}
+
+void ExitanceField::divide_meshes(double distance) {
+  std::vector<Division> runs((corners_.size() + kRun - 1) / kRun);
+  parallel_for(runs.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t r = first; r < last; ++r) {
+      Division& run = runs[r];
+      run.begin = r * kRun;
+      run.end = std::min(run.begin + kRun, corners_.size());
+      Divider divider(positions_, distance, run);
+      for (std::size_t i = run.begin; i < run.end; ++i)
+        run.parts.push_back(divider.divide_triangle(static_cast<std::uint32_t>(i), corners_[i]));
+      divider.end();
+    }
+  });
+  // One after the other, renumbered.
+  const auto vertices = static_cast<std::uint32_t>(positions_.size()),
+             triangles = static_cast<std::uint32_t>(corners_.size());
+  parts_.resize(triangles);
+  Numbering<Vec3, HashPosition> extras;
+  std::vector<std::uint32_t> numbers;
+  for (const Division& run : runs) {
+    numbers.clear();
+    for (const Vec3& p : run.positions) numbers.push_back(vertices + extras.find_or_add(p));
+    const auto patch = triangles + static_cast<std::uint32_t>(patches_.size()),
+               split = static_cast<std::uint32_t>(splits_.size()), part = static_cast<std::uint32_t>(parts_.size());
+    const auto renumber = [&](std::uint32_t p) {
+      return p & kSplitBit ? p + split : p & kPatchBit ? (p & ~kPatchBit) + patch : p;
+    };
+    std::ranges::transform(run.parts, parts_.begin() + static_cast<std::ptrdiff_t>(run.begin), renumber);
+    std::ranges::transform(run.parts_of_splits, std::back_inserter(parts_), renumber);
+    for (Split s : run.splits) splits_.push_back({s.first + part, s.pattern});
+    for (Patch p : run.patches) {
+      for (std::uint32_t& node : p.nodes)
+        if (node != kNone && node >= vertices) node = numbers[node - vertices];
+      patches_.push_back(p);
+    }
+  }
+  positions_.insert(positions_.end(), extras.keys().begin(), extras.keys().end());
+}
+
+void ExitanceField::make_blocks() {
+  std::vector<std::uint64_t> codes(positions_.size());
+  parallel_for(codes.size(), kRun, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      codes[i] = exitance_.cell_code(positions_[i]) >> 3 * Exitance::kWholeLevel;
+  });
+  Numbering<std::uint64_t, HashCode> numbers;
+  std::vector<std::uint32_t> first_seen(codes.size());
+  for (std::size_t i = 0; i < codes.size(); ++i)
+    first_seen[i] = i > 0 && codes[i] == codes[i - 1] ? first_seen[i - 1] : numbers.find_or_add(codes[i]);
+  // In Morton order, so that neighbours share what is far.
+  const std::vector<std::uint64_t>& keys = numbers.keys();
+  std::vector<std::uint32_t> order(keys.size()), rank(keys.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  parallel_sort(order.begin(), order.end(),
+                [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+  for (std::uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+  block_of_.resize(codes.size());
+  block_begin_.assign(keys.size() + 1, 0);
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    block_of_[i] = rank[first_seen[i]];
+    ++block_begin_[block_of_[i] + 1];
+  }
+  for (std::size_t i = 1; i < block_begin_.size(); ++i) block_begin_[i] += block_begin_[i - 1];
+  block_nodes_.resize(codes.size());
+  std::vector<std::uint32_t> next(block_begin_.begin(), block_begin_.end() - 1);
+  for (std::uint32_t i = 0; i < codes.size(); ++i) block_nodes_[next[block_of_[i]]++] = i;
+}
+
+}  // namespace nacre
