@@ -23,7 +23,7 @@ constexpr std::size_t kPointsPerCell = 32;
 // A block (level kBlockLevels), a cell (level 0) or one between: what all its points share.
 struct Exitance::Target {
   Vec3 centre;
-  float radius;       // of a ball around all its points
+  float radius;        // of a ball around all its points
   LocalExpansion far;  // of what is far from all of it
   IndexList pending;   // octree nodes that its parts deal with
 };
@@ -52,8 +52,7 @@ void Exitance::place(Target& target, std::span<const Point> range, int level, co
     const double size = cell_size_ * static_cast<double>(1 << level);
     for (int axis = 0; axis < 3; ++axis)
       target.centre[axis] = static_cast<float>(
-          origin_[axis] +
-          (static_cast<double>(gather_bits(range[0].code >> axis) >> level) + 0.5) * size);
+          origin_[axis] + (static_cast<double>(gather_bits(range[0].code >> axis) >> level) + 0.5) * size);
     target.radius = static_cast<float>(size * std::sqrt(0.75));
   }
   // What rounding of positions, distances and roots may take away.
@@ -81,14 +80,25 @@ Float4 Exitance::weigh(const Target& target, Room& room) const {
   return total;
 }
 
+Rgb Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
+  const Vec3& x = room.points[point.index];
+  const Float4 far = target.far.eval(x - target.centre);
+  std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
+  lanes::add_sources(kernel_.tables(), room.list, x, sum);
+  room.evaluations += room.list.size();
+  Rgb value;
+  for (int k = 0; k < 3; ++k) value[k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
+  return value;
+}
+
 // Sums up for the points of one block or cell, which follow each other.
 void Exitance::eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const {
   Target& target = room.targets[static_cast<std::size_t>(level)];
   place(target, range, level, room);
   target.far = parent ? parent->far.moved(target.centre - parent->centre) : LocalExpansion{};
   target.pending.clear();
-  const bool is_leaf =
-      level == 0 || (room.whole ? level <= kWholeLevel && range.size() <= kPointsPerCell : level <= kLeafLevel);
+  const bool is_leaf = level == 0 || (room.whole ? level <= kWholeLevel && range.size() <= kPointsPerCell
+                                                 : level <= kLeafLevel);
 
   const Float4 total = weigh(target, room);
   Rgb share(0, 0, 0);
@@ -97,8 +107,8 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * total[k] / nodes_[0].power[k];
   const double classes =
       std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
-  const Radius& radius = radii_[static_cast<std::size_t>(
-      std::clamp(classes, 0.0, static_cast<double>(radii_.size() - 1)))];
+  const Radius& radius =
+      radii_[static_cast<std::size_t>(std::clamp(classes, 0.0, static_cast<double>(radii_.size() - 1)))];
   const std::array<const float*, 3> per_bend{per_bend_[0].data(), per_bend_[1].data(), per_bend_[2].data()};
   const auto limits = [&](const std::array<std::vector<float>, 3>& channels, std::vector<float>& out) {
     out.resize(lean_.size());
@@ -110,9 +120,15 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   limits(radius.in_series, room.in_series);
 
   SortedNodes& nodes = room.nodes;
-  const NodeTest test{nodes_.data(),  target.centre,           target.radius,
-                      nearest_,       is_leaf,                 promise_ == Promise::kCertified,
-                      bins_,          lean_.data(),            room.as_point.data(),
+  const NodeTest test{nodes_.data(),
+                      target.centre,
+                      target.radius,
+                      nearest_,
+                      is_leaf,
+                      promise_ == Promise::kCertified,
+                      bins_,
+                      lean_.data(),
+                      room.as_point.data(),
                       room.in_series.data()};
   nodes.far.clear();
   nodes.points.clear();
@@ -135,8 +151,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       const SumNode& node = nodes_[index];
       for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
       if (node.child_count() == 0)
-        for (std::uint32_t i = 0; i < node.sample_count(); ++i)
-          nodes.far_samples.push(node.first_sample + i);
+        for (std::uint32_t i = 0; i < node.sample_count(); ++i) nodes.far_samples.push(node.first_sample + i);
     }
     for (const std::uint32_t index : nodes.opened.span()) {
       const SumNode& node = nodes_[index];
@@ -157,19 +172,12 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
       const SumNode& node = nodes_[index];
-      const SumSource source{node.x, node.y, node.z, 0, Float4{node.power[0], node.power[1], node.power[2], 0}};
+      const SumSource source{node.x, node.y, node.z, 0,
+                             Float4{node.power[0], node.power[1], node.power[2], 0}};
       room.list.add({&source, 1});
     }
     room.list.pad();
-    for (const Point& point : range) {
-      const Vec3& x = room.points[point.index];
-      const Float4 far = target.far.eval(x - target.centre);
-      std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
-      lanes::add_sources(kernel_.tables(), room.list, x, sum);
-      for (int k = 0; k < 3; ++k)
-        room.exitance[point.index][k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
-    }
-    room.evaluations += room.list.size() * range.size();
+    for (const Point& point : range) room.exitance[point.index] = eval_point(target, point, room);
     return;
   }
   for (const std::uint32_t index : nodes.points.span()) target.pending.push(index);
@@ -208,8 +216,7 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   Room room{points, exitance, whole, {}, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
-    while (end < order.size() &&
-           order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)
+    while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)
       ++end;
     eval_target(std::span(order).subspan(begin, end - begin), kBlockLevels, nullptr, room);
     begin = end;
@@ -230,8 +237,7 @@ void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
       lanes::add_sources(kernel_.tables(), list, points[i], totals[i]);
   }
   for (std::size_t i = 0; i < points.size(); ++i)
-    for (int k = 0; k < 3; ++k)
-      exitance[i][k] = static_cast<float>(totals[i][static_cast<std::size_t>(k)]);
+    for (int k = 0; k < 3; ++k) exitance[i][k] = static_cast<float>(totals[i][static_cast<std::size_t>(k)]);
   evaluations += points.size() * sources_.size();
 }
 

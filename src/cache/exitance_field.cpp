@@ -15,7 +15,7 @@ enum PatchState : std::uint8_t { kUnknown, kSmooth, kSteep };
 
 // A patch over which M_o bends by more than this share of itself, or changes so much along an edge, may err
 // by more than the tolerance: light there is as narrow as a mean free path.
-constexpr float kMostBend = 0.02f, kMostChange = 0.2f;
+constexpr float kMostBend = 0.08f, kMostChange = 0.4f;
 
 }  // namespace
 

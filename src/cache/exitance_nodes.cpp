@@ -141,7 +141,8 @@ class ExitanceField::Divider {
     std::array<std::uint32_t, 4> made{};
     for (std::uint32_t i = 0; i < part_count(pattern); ++i) made[i] = divide(pieces[i], depth + 1);
     into_.splits[split] = {static_cast<std::uint32_t>(into_.parts_of_splits.size()), pattern};
-    into_.parts_of_splits.insert(into_.parts_of_splits.end(), made.begin(), made.begin() + part_count(pattern));
+    into_.parts_of_splits.insert(into_.parts_of_splits.end(), made.begin(),
+                                 made.begin() + part_count(pattern));
     return kSplitBit | split;
   }
 
@@ -214,7 +215,8 @@ void ExitanceField::divide_meshes(double distance) {
     numbers.clear();
     for (const Vec3& p : run.positions) numbers.push_back(vertices + extras.find_or_add(p));
     const auto patch = triangles + static_cast<std::uint32_t>(patches_.size()),
-               split = static_cast<std::uint32_t>(splits_.size()), part = static_cast<std::uint32_t>(parts_.size());
+               split = static_cast<std::uint32_t>(splits_.size()),
+               part = static_cast<std::uint32_t>(parts_.size());
     const auto renumber = [&](std::uint32_t p) {
       return p & kSplitBit ? p + split : p & kPatchBit ? (p & ~kPatchBit) + patch : p;
     };

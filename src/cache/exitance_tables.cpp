@@ -63,7 +63,8 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
     allowance_ = tolerance - tables;
     if (!(allowance_ > tables))
       fail(ErrorCode::kLimit, group.name,
-           "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of {:.1g} or more, "
+           "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of "
+           "{:.1g} or more, "
            "or --method exact",
            tolerance, tables, 2 * tables);
   }
@@ -77,10 +78,17 @@ void Exitance::make_nodes() {
     for (std::size_t i = begin; i < end; ++i) {
       const OctreeNode& from = group_.nodes[i];
       SumNode& node = nodes_[i];
-      node = {from.centre[0], from.centre[1], from.centre[2], from.radius, -1, 0,
+      node = {from.centre[0],
+              from.centre[1],
+              from.centre[2],
+              from.radius,
+              -1,
+              0,
               from.child_count() > 0 ? from.radius : 0.0f,
               {from.power[0], from.power[1], from.power[2]},
-              from.first_child, from.packed_counts, from.first_sample};
+              from.first_child,
+              from.packed_counts,
+              from.first_sample};
       for (int k = 0; k < 3; ++k)
         if (from.power[k] > 0) {
           // Rounded up by more than division and the bounds' product lose.
@@ -145,7 +153,8 @@ void Exitance::make_tables() {
           const auto channel = static_cast<int>(k);
           const double there = std::sqrt(double{edge2(i + 1)}) + radius;
           const double value = own * double{kernel_.eval(static_cast<float>(square(there)))[channel]};
-          const double series = weight * radius * radius * radius * double{kernel_.bounds(edge2(i)).third[channel]};
+          const double series =
+              weight * radius * radius * radius * double{kernel_.bounds(edge2(i)).third[channel]};
           const auto limit = [&](double allowed) {
             return static_cast<float>(
                 std::clamp(allowed * double{per_bend_[k][i]}, -double{kNoLimit}, double{kNoLimit}));

@@ -132,8 +132,8 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
 KernelTables Kernel::tables() const noexcept {
   static_assert(sizeof(Cell) == 8 * sizeof(float) && sizeof(JetCell) == 16 * sizeof(float));
   const auto bins = [](std::uint32_t first, std::size_t count, int shift) {
-    return DistanceBins{static_cast<std::int32_t>(first),
-                        static_cast<std::int32_t>(first + count - 1), shift};
+    return DistanceBins{static_cast<std::int32_t>(first), static_cast<std::int32_t>(first + count - 1),
+                        shift};
   };
   return {reinterpret_cast<const float*>(cells_.data()),
           reinterpret_cast<const float*>(jets_.data()),
@@ -147,7 +147,8 @@ KernelTables Kernel::tables() const noexcept {
 
 double Kernel::relative_error(float distance) const noexcept {
   // As a function of s = r^2 the profile falls locally like a power, at most (3 + sigma r)/2, and over a cell
-  // of width h s a chord errs by at most h^2/8 of s^2 R''/R. A tenth is added for rounding of the cells' ends.
+  // of width h s a chord errs by at most h^2/8 of s^2 R''/R. A tenth is added for rounding of the cells'
+  // ends.
   const double power = (3 + std::min(steepest_ * double{distance}, 80.0)) / 2;
   return 1.1 * square(1.0 / (1 << kCellBits)) / 8 * power * (power + 1);
 }

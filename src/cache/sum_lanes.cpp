@@ -49,17 +49,19 @@ HWY_INLINE VF disc_distance2(const KernelTables& kernel, VF r2, VF area) {
   const auto inside = hn::Lt(r2, hn::Mul(radius2, hn::Set(df, square(kernel.disc_reach))));
   if (hn::AllFalse(df, inside)) return r2;
   const VF radius = hn::Sqrt(radius2);
-  const VF t =
-      hn::IfThenElseZero(inside, hn::Mul(hn::Div(hn::Sqrt(r2), radius), hn::Set(df, kernel.discs_per_radius)));
-  const VI cell = hn::Min(hn::ConvertTo(di, t),
-                          hn::Set(di, static_cast<std::int32_t>(kernel.discs_per_radius * kernel.disc_reach) - 1));
+  const VF t = hn::IfThenElseZero(
+      inside, hn::Mul(hn::Div(hn::Sqrt(r2), radius), hn::Set(df, kernel.discs_per_radius)));
+  const VI cell =
+      hn::Min(hn::ConvertTo(di, t),
+              hn::Set(di, static_cast<std::int32_t>(kernel.discs_per_radius * kernel.disc_reach) - 1));
   const VF low = hn::GatherIndex(df, kernel.discs, cell), high = hn::GatherIndex(df, kernel.discs + 1, cell);
   const VF effective =
       hn::Div(radius, hn::MulAdd(hn::Sub(t, hn::ConvertTo(df, cell)), hn::Sub(high, low), low));
   return hn::IfThenElse(inside, hn::Mul(effective, effective), r2);
 }
 
-void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x, std::array<double, 3>& total) {
+void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
+                 std::array<double, 3>& total) {
   const F df;
   // Runs of a few terms are kept by floats; the whole is added up in double precision.
   constexpr std::size_t kRun = 64;
@@ -109,7 +111,8 @@ template <class Struct>
 HWY_INLINE Fields gather(const Struct* structs, hn::Vec<U> index) {
   const I di;
   return {reinterpret_cast<const float*>(structs),
-          hn::Mul(hn::BitCast(di, index), hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
+          hn::Mul(hn::BitCast(di, index),
+                  hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
 }
 // The fields of a SumNode, float by float.
 enum NodeField { kNodeX, kNodeY, kNodeZ, kNodeRadius, kNodeSpread, kNodeLean, kNodeOpening, kNodePower };
@@ -139,7 +142,8 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
     const auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
     const auto far = hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.in_series, bin)));
-    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.as_point, bin))));
+    const auto point =
+        hn::AndNot(far, hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.as_point, bin))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
     const VI rim_bin = find_cell(test.bins, hn::Mul(to_rim, to_rim));
     const auto scattered =
@@ -172,7 +176,12 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
     near.reserve(lanes);
     const auto here = hn::AndNot(far, batch.valid);
-    const VF values[] = {x, y, z, source(kSourceArea), source(kSourcePower), source(kSourcePower + 1),
+    const VF values[] = {x,
+                         y,
+                         z,
+                         source(kSourceArea),
+                         source(kSourcePower),
+                         source(kSourcePower + 1),
                          source(kSourcePower + 2)};
     for (int f = 0; f < SourceList::kFieldCount; ++f)
       hn::CompressStore(values[f], here, df, near.end(static_cast<SourceList::Field>(f)));
@@ -181,8 +190,9 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
 }
 
 template <int kPower, class Struct>
-HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs, std::span<const std::uint32_t> far,
-                            const Vec3& centre, LocalExpansion& expansion) {
+HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
+                            std::span<const std::uint32_t> far, const Vec3& centre,
+                            LocalExpansion& expansion) {
   const F df;
   const std::size_t lanes = hn::Lanes(df);
   const VF cx = hn::Set(df, centre.x), cy = hn::Set(df, centre.y), cz = hn::Set(df, centre.z);
@@ -229,8 +239,8 @@ void add_node_series(const KernelTables& kernel, const SumNode* nodes, std::span
                      const Vec3& centre, LocalExpansion& expansion) {
   add_structs<kNodePower>(kernel, nodes, far, centre, expansion);
 }
-void add_sample_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,
-                       const Vec3& centre, LocalExpansion& expansion) {
+void add_sample_series(const KernelTables& kernel, const SumSource* sources,
+                       std::span<const std::uint32_t> far, const Vec3& centre, LocalExpansion& expansion) {
   add_structs<kSourcePower>(kernel, sources, far, centre, expansion);
 }
 
@@ -245,8 +255,8 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
     const Batch batch = load_batch(lists.work.data(), i, count);
     const Fields node = gather(test.nodes, batch.index);
     const VF radius = node(kNodeRadius);
-    const VF r = hn::Sqrt(
-        length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz)));
+    const VF r =
+        hn::Sqrt(length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz)));
     const auto open = hn::And(batch.valid, hn::Gt(node(kNodeOpening), hn::Mul(hn::Set(df, test.ratio), r)));
     append(lists.opened, lists.opened.room(lanes), batch.index, open);
     const auto taken = hn::AndNot(open, batch.valid);
@@ -316,7 +326,8 @@ HWY_EXPORT(add_sample_series);
 HWY_EXPORT(add_coarsely);
 HWY_EXPORT(least_of_channels);
 
-void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x, std::array<double, 3>& total) {
+void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
+                 std::array<double, 3>& total) {
   HWY_DYNAMIC_DISPATCH(add_sources)(kernel, list, x, total);
 }
 void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH(sort_nodes)(test, lists); }

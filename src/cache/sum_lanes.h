@@ -94,7 +94,8 @@ struct SortedNodes {
 namespace lanes {
 
 /// Adds sum R_d(|x - p|) P over a padded list to `total`.
-void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x, std::array<double, 3>& total);
+void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
+                 std::array<double, 3>& total);
 void sort_nodes(const NodeTest& test, SortedNodes& lists);
 /// The same for `samples`: `far_samples`, or the list.
 void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near);

@@ -87,6 +87,7 @@ class Exitance {
                    bool whole) const;
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
   Float4 weigh(const Target& target, Room& room) const;
+  Rgb eval_point(const Target& target, const Point& point, Room& room) const;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
 
   const CacheGroup& group_;

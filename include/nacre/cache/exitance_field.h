@@ -68,7 +68,7 @@ class ExitanceField {
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
-  std::vector<std::uint32_t> first_triangle_;  // by mesh, and the end
+  std::vector<std::uint32_t> first_triangle_;          // by mesh, and the end
   std::vector<std::array<std::uint32_t, 3>> corners_;  // of triangles, as nodes
   std::vector<std::uint32_t> parts_;  // by triangle, then parts of splits: a patch or kSplitBit and a split
   std::vector<Patch> patches_;        // their numbers follow those of the triangles that are whole patches
@@ -77,7 +77,7 @@ class ExitanceField {
   std::vector<std::uint32_t> block_of_;     // by node
   std::vector<std::uint32_t> block_begin_;  // first of each block in block_nodes_, and the end
   std::vector<std::uint32_t> block_nodes_;
-  mutable std::vector<Rgb> values_;         // of nodes
+  mutable std::vector<Rgb> values_;  // of nodes
   std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_state_;
 };
 

@@ -46,8 +46,8 @@ class Kernel {
   /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
   /// profiles (R_d of the others hardly varies over a sample's share).
   Float4 eval_disc(float r2, float area) const noexcept;
-  /// The largest relative error of `eval` up to a distance, which linear interpolation makes where the profile
-  /// falls like exp(-sigma_tr r) within a cell.
+  /// The largest relative error of `eval` up to a distance, which linear interpolation makes where the
+  /// profile falls like exp(-sigma_tr r) within a cell.
   double relative_error(float distance) const noexcept;
   /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
   static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
