@@ -9,6 +9,7 @@
 
 #include "nacre/base/file.h"
 #include "nacre/base/parallel.h"
+#include "nacre/base/simd.h"
 #include "nacre/base/version.h"
 #include "nacre/geometry/mesh_file.h"
 #include "nacre/scene/scene_file.h"
@@ -41,6 +42,9 @@ Session::Session(const CommonOptions& options, std::string command)
       command_(std::move(command)),
       limit_(options.threads),
       progress_(progress_style(options.quiet)) {
+  if (!options_.simd.empty() && !choose_simd_target(options_.simd))
+    throw UsageError(
+        fmt::format("--simd {}: this processor has {}", options_.simd, fmt::join(simd_targets(), ", ")));
   if (!options_.report_path.empty()) check_writable(options_.report_path);
 }
 
@@ -54,7 +58,7 @@ void Session::finish() {
   json["nacre"] = kVersion;
   json["command"] = command_;
   json["threads"] = thread_count();
-  json["simd"] = "scalar";
+  json["simd"] = simd_target();
   for (const auto& [stage, seconds] : report_.seconds) json["seconds"][stage] = seconds;
   json["seconds"]["total"] = watch_.seconds();
   json["counts"] = report_.counts;
@@ -70,6 +74,8 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--threads", options.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
   command.add_option("--seed", options.seed, "Seed of all random numbers (default: 0)");
+  command.add_option("--simd", options.simd,
+                     "Vector instructions to use, as the report names them, or scalar (default: the best)");
   command.add_flag("--quiet", options.quiet, "No progress; warnings and errors only");
   command.add_option("--report", options.report_path, "Write times and counts to this JSON file");
 }

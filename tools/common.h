@@ -26,7 +26,7 @@ struct CommonOptions {
   int threads = 0;
   std::uint64_t seed = 0;
   bool quiet = false;
-  std::string report_path;
+  std::string report_path, simd;
 };
 
 /// One run of a command: limits, progress and report for its whole life.

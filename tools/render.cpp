@@ -24,7 +24,7 @@ struct Options {
   std::optional<int> single_samples, mc_samples;
   std::optional<std::string> mc_sampling;
   int verify = 0;
-  bool png = false;
+  bool png = false, certified = false;
 };
 
 // In the order of Method.
@@ -93,6 +93,7 @@ RenderParams make_params(const Options& options, const Scene& scene, const std::
   if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
   params.method = method_of(options);
   if (options.tolerance) params.tolerance = *options.tolerance;
+  params.certified = options.certified;
   if (options.single_samples) params.single_samples = *options.single_samples;
   if (options.mc_samples) params.mc_samples = *options.mc_samples;
   if (options.mc_sampling == "uniform") params.mc_sampling = MonteCarloSampling::kUniform;
@@ -163,6 +164,8 @@ void check_combination(const Options& options) {
     throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
   if (options.verify > 0 && method != Method::kHierarchical)
     throw UsageError("--verify measures --method hierarchical; " + options.method + " has no such error");
+  if (options.certified && method != Method::kHierarchical)
+    throw UsageError("--certified is for --method hierarchical; " + options.method + " has no tolerance");
   if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
@@ -321,6 +324,8 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->add_option("--tolerance", options->tolerance,
                    "Relative error of the hierarchical sum (default: 0.01)")
       ->check(CLI::Range(0.0, 1.0));
+  command->add_flag("--certified", options->certified,
+                    "No pixel and channel errs by more than the tolerance; slower");
   command
       ->add_option("--single-samples", options->single_samples,
                    "Points of single scattering per camera sample (default: 2; 0: none)")

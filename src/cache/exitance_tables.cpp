@@ -15,7 +15,7 @@ namespace {
 // that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
 // shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
 // a relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 10;
+constexpr double kCalibration = 13;
 
 // A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
 // share of the bound on its third derivatives.

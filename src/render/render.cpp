@@ -43,6 +43,13 @@ Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& p
 }
 Renderer::~Renderer() = default;
 
+void Renderer::fill(Report& report) const {
+  const StageTimer timer(report, "diffusion");
+  std::uint64_t evaluations = 0;
+  for (const Translucency& medium : media_) medium.fill(evaluations);
+  report.counts["kernel_evaluations"] += evaluations;
+}
+
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,
              Report& report, Warnings& warnings) {
   return Renderer(world, cache, params, report).render(params, progress, report, warnings);

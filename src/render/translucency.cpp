@@ -28,8 +28,12 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
   const auto profiles = make_profiles(m);
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_)) {
-    exitance_ = std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance);
-    if (method_ == Method::kHierarchical && params.tolerance > 0) make_field(*group, params.tolerance);
+    exitance_ =
+        std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance,
+                                         params.certified ? Promise::kCertified : Promise::kCalibrated);
+    // Interpolation has no bound.
+    if (method_ == Method::kHierarchical && params.tolerance > 0 && !params.certified)
+      make_field(*group, params.tolerance);
   } else if (method_ == Method::kMonteCarlo)
     monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.

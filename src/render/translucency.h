@@ -34,6 +34,10 @@ class Translucency {
   /// those of the profile.
   void eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
                       std::uint64_t& evaluations) const;
+  /// Evaluates diffusion on the whole surface, where it is kept.
+  void fill(std::uint64_t& evaluations) const {
+    if (field_) field_->fill(evaluations);
+  }
   /// M_o of kHierarchical at hits, and the sum over every sample that it stands for.
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   bool has_single_scattering() const { return single_.has_value(); }

@@ -34,6 +34,7 @@ struct RenderParams {
   int samples_per_pixel = 16;
   Method method = Method::kHierarchical;
   double tolerance = 0.01;
+  bool certified = false;  // kHierarchical: tolerance bounds the error of every pixel and channel
   int single_samples = 2;  // points per camera sample, each connected to every light; 0: no single scattering
   int mc_samples = 64;     // kMonteCarlo: surface points per camera sample
   MonteCarloSampling mc_sampling = MonteCarloSampling::kExponential;
@@ -64,6 +65,10 @@ class Renderer {
   /// outlive it. Of `params` it takes the method, its tolerance, samples and bounces; pictures have the same.
   Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report);
   ~Renderer();
+
+  /// Evaluates diffusion on the whole surface, so that every picture after it finds it there; nothing where
+  /// it is not kept. Adds its time to "diffusion".
+  void fill(Report& report) const;
 
   /// Renders one picture. A pixel depends on the scene, the cache, its own coordinates and the parameters but
   /// for the crop, and on nothing else: not on threads, nor on pictures before it. Layers: `diffusion`,
