@@ -17,7 +17,7 @@ struct Options {
   CommonOptions common;
   SceneOptions scene;
   BakeOptions bake;
-  std::string output, cache, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  std::string output, cache, exitance, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
   std::vector<std::string> cameras;
   int samples_per_pixel = 0;
   std::optional<double> tolerance;
@@ -166,6 +166,8 @@ void check_combination(const Options& options) {
     throw UsageError("--verify measures --method hierarchical; " + options.method + " has no such error");
   if (options.certified && method != Method::kHierarchical)
     throw UsageError("--certified is for --method hierarchical; " + options.method + " has no tolerance");
+  if (!options.exitance.empty() && (method != Method::kHierarchical || options.certified))
+    throw UsageError("--exitance keeps what --method hierarchical interpolates, without --certified");
   if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
@@ -231,7 +233,11 @@ std::vector<Picture> plan_pictures(const Options& options) {
         throw UsageError("--camera " + camera + ": two pictures would be written to " + picture.path);
     pictures.push_back(picture);
   }
-  const std::vector<std::string> inputs{options.scene.path, options.cache};
+  std::vector<std::string> inputs{options.scene.path, options.cache};
+  if (!options.exitance.empty()) {
+    check_writable(options.exitance, inputs);
+    inputs.push_back(options.exitance);
+  }
   for (const Picture& picture : pictures) {
     check_writable(picture.path, inputs);
     if (!options.png) continue;
@@ -279,6 +285,10 @@ void run(const Options& options, const std::string& command_line) {
   if (cached) session.warn(check_density(scene, cache));
 
   const Renderer renderer(world, cache, params[0], session.report());
+  if (!options.exitance.empty()) {
+    const StageTimer timer(session.report(), "read_cache");
+    renderer.load_exitance(options.exitance);
+  }
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Warnings warnings;
     Image image = renderer.render(params[i], session.progress(), session.report(), warnings);
@@ -292,6 +302,13 @@ void run(const Options& options, const std::string& command_line) {
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
     save_picture(image, pictures[i], options, exposure, session);
     if (options.verify > 0) report_verification(renderer.verify(params[i], options.verify), session);
+  }
+  if (!options.exitance.empty()) {
+    const StageTimer timer(session.report(), "write_cache");
+    if (!renderer.save_exitance(options.exitance))
+      session.warn({options.exitance +
+                    " is not written: no medium here has exitance that is smooth between nodes (normalized "
+                    "diffusion, samples further apart than a mean free path, --tolerance 0)"});
   }
   session.finish();
 }
@@ -324,6 +341,8 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->add_option("--tolerance", options->tolerance,
                    "Relative error of the hierarchical sum (default: 0.01)")
       ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--exitance", options->exitance,
+                      "Keep the diffusion that is evaluated in this file, and take it from there next time");
   command->add_flag("--certified", options->certified,
                     "No pixel and channel errs by more than the tolerance; slower");
   command

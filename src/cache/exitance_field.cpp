@@ -1,6 +1,9 @@
 // Interpolation within patches, and filling of their nodes.
 #include "nacre/cache/exitance_field.h"
 
+#include <fmt/format.h>
+#include <xxhash.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -79,6 +82,30 @@ void ExitanceField::fill(std::uint64_t& evaluations) const {
     sum += own;
   });
   evaluations += sum;
+}
+
+KeptExitance ExitanceField::keep() const {
+  const XXH128_hash_t hash = XXH3_128bits(positions_.data(), positions_.size() * sizeof(Vec3));
+  KeptExitance kept;
+  kept.key = {{"nodes", fmt::format("{:016x}{:016x}", hash.high64, hash.low64)}};
+  kept.filled.resize(block_begin_.size() - 1);
+  kept.values.resize(values_.size(), Rgb(0, 0, 0));
+  for (std::size_t block = 0; block < kept.filled.size(); ++block) {
+    if (block_state_[block].load(std::memory_order_acquire) != kFull) continue;
+    kept.filled[block] = 1;
+    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
+      kept.values[block_nodes_[i]] = values_[block_nodes_[i]];
+  }
+  return kept;
+}
+
+void ExitanceField::restore(const KeptExitance& kept) const {
+  for (std::size_t block = 0; block < kept.filled.size(); ++block) {
+    if (!kept.filled[block]) continue;
+    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
+      values_[block_nodes_[i]] = kept.values[block_nodes_[i]];
+    block_state_[block].store(kFull, std::memory_order_release);
+  }
 }
 
 std::size_t ExitanceField::filled_node_count() const {

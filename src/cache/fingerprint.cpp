@@ -243,6 +243,13 @@ std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t g
   return bounces;
 }
 
+std::string samples_digest(const CacheGroup& group) {
+  const HashState state = make_hash();
+  for (const auto& plane : group.planes) XXH3_128bits_update(state.get(), plane.data(), plane.size_bytes());
+  XXH3_128bits_update(state.get(), group.nodes.data(), group.nodes.size_bytes());
+  return digest(state);
+}
+
 std::string fingerprint_digest(const KeyValues& fingerprint) {
   const HashState state = make_hash();
   for (const auto& [key, value] : fingerprint) {

@@ -1,6 +1,8 @@
 // A picture: pixels in parallel, times and counts.
 #include "nacre/render/render.h"
 
+#include <filesystem>
+
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "render/pixel_loop.h"
@@ -48,6 +50,28 @@ void Renderer::fill(Report& report) const {
   std::uint64_t evaluations = 0;
   for (const Translucency& medium : media_) medium.fill(evaluations);
   report.counts["kernel_evaluations"] += evaluations;
+}
+
+void Renderer::load_exitance(const std::string& path) const {
+  if (!std::filesystem::exists(path)) return;
+  const std::vector<KeptExitance> file = nacre::load_exitance(path);
+  std::vector<KeptExitance> own;
+  for (const Translucency& medium : media_) own.push_back(medium.keep());
+  check_exitance_keys(path, file, own);
+  for (std::size_t m = 0; m < media_.size(); ++m) media_[m].restore(file[m]);
+}
+
+bool Renderer::save_exitance(const std::string& path) const {
+  std::vector<KeptExitance> own;
+  std::vector<std::vector<std::uint32_t>> block_of;
+  bool any = false;
+  for (const Translucency& medium : media_) {
+    own.push_back(medium.keep());
+    block_of.push_back(medium.block_of_node());
+    any = any || !own.back().key.empty();
+  }
+  if (any) extend_exitance(path, std::move(own), block_of);
+  return any;
 }
 
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,

@@ -2,6 +2,7 @@
 #include "render/translucency.h"
 
 #include "nacre/base/random.h"
+#include "nacre/cache/fingerprint.h"
 #include "nacre/optics/profile.h"
 #include "nacre/transport/irradiance.h"
 
@@ -23,7 +24,9 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
       bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
       light_samples_(world.scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
-      mc_samples_(params.mc_samples) {
+      mc_samples_(params.mc_samples),
+      tolerance_(params.tolerance),
+      group_(group) {
   const Medium& m = world.scene->media[medium];
   const auto profiles = make_profiles(m);
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
@@ -54,6 +57,27 @@ void Translucency::make_field(const CacheGroup& group, double tolerance) {
   const double distance = ExitanceField::node_distance(tolerance) * length;
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
+}
+
+// All that M_o depends on, by name.
+KeptExitance Translucency::keep() const {
+  if (!field_) return {};
+  KeptExitance kept = field_->keep();
+  const Medium& m = world_.scene->media[medium_];
+  const auto triple = [](const Rgb& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
+  const std::string label = medium_label(*world_.scene, medium_);
+  KeyValues key{{"samples", samples_digest(*group_)},
+                {"sigma_s", triple(m.sigma_s)},
+                {"sigma_a", triple(m.sigma_a)},
+                {"g", triple(m.g)},
+                {"eta", fmt::format("{}", m.eta())},
+                {"mm per unit", fmt::format("{}", m.scale)},
+                {"profile", fmt::format("{}", static_cast<int>(m.profile))},
+                {"tolerance", fmt::format("{}", tolerance_)}};
+  for (auto& entry : key) entry.first = label + "/" + entry.first;
+  kept.key.front().first = label + "/" + kept.key.front().first;
+  kept.key.insert(kept.key.begin(), key.begin(), key.end());
+  return kept;
 }
 
 void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,

@@ -38,6 +38,14 @@ class Translucency {
   void fill(std::uint64_t& evaluations) const {
     if (field_) field_->fill(evaluations);
   }
+  /// What is evaluated so far, or an empty key where nothing is kept; the blocks of its nodes.
+  KeptExitance keep() const;
+  std::vector<std::uint32_t> block_of_node() const {
+    return field_ ? field_->block_of_node() : std::vector<std::uint32_t>{};
+  }
+  void restore(const KeptExitance& kept) const {
+    if (field_) field_->restore(kept);
+  }
   /// M_o of kHierarchical at hits, and the sum over every sample that it stands for.
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   bool has_single_scattering() const { return single_.has_value(); }
@@ -54,6 +62,8 @@ class Translucency {
   float exit_factor_;
   Rgb total_;  // of the profile
   int bounces_, light_samples_, single_samples_, mc_samples_;
+  double tolerance_;
+  const CacheGroup* group_;
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;
   std::optional<MonteCarloDiffusion> monte_carlo_;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "nacre/cache/exitance.h"
+#include "nacre/cache/exitance_file.h"
 #include "nacre/geometry/mesh.h"
 #include "nacre/geometry/ray_tracer.h"
 
@@ -43,6 +44,11 @@ class ExitanceField {
   void fill(std::uint64_t& evaluations) const;
   std::size_t node_count() const { return positions_.size(); }
   std::size_t filled_node_count() const;
+  const std::vector<std::uint32_t>& block_of_node() const { return block_of_; }
+  /// What is evaluated so far, with a hash of where the nodes are as the key.
+  KeptExitance keep() const;
+  /// Takes over what an equal field has evaluated: same key, same numbers. Not while others evaluate.
+  void restore(const KeptExitance& kept) const;
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;

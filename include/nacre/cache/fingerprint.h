@@ -21,6 +21,9 @@ std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t g
 /// Whether it was made with interreflection.
 bool fingerprint_interreflects(const KeyValues& fingerprint);
 
+/// A 32-digit hash of a group's samples and octree, whatever scene they belong to.
+std::string samples_digest(const CacheGroup& group);
+
 /// A 32-digit hash of a fingerprint.
 std::string fingerprint_digest(const KeyValues& fingerprint);
 

@@ -70,6 +70,13 @@ class Renderer {
   /// it is not kept. Adds its time to "diffusion".
   void fill(Report& report) const;
 
+  /// Takes over what --exitance has kept; a file that is not there is an empty one. Throws Error with `path`:
+  /// kMismatch saying what differs, and what load_exitance throws.
+  void load_exitance(const std::string& path) const;
+  /// Adds what has been evaluated to that file, if that is anything new; returns whether there is anything to
+  /// keep. Throws Error with `path`.
+  bool save_exitance(const std::string& path) const;
+
   /// Renders one picture. A pixel depends on the scene, the cache, its own coordinates and the parameters but
   /// for the crop, and on nothing else: not on threads, nor on pictures before it. Layers: `diffusion`,
   /// `single` and `specular` of translucent objects, `surface` of all others, means over the pixel's samples;
