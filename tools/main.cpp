@@ -1,4 +1,6 @@
 // The program: subcommands, errors, exit codes.
+#include <malloc.h>
+
 #include <csignal>
 #include <new>
 
@@ -22,6 +24,9 @@ int report_error(const std::string& message, int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Memory that is given back is soon wanted again: keep it, rather than have the system clear it each time.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
   // A closed pipe is an error like any other, not a silent death.
   std::signal(SIGPIPE, SIG_IGN);
   CLI::App app{

@@ -74,8 +74,7 @@ Float4 Exitance::weigh(const Target& target, Room& room) const {
     room.evaluations += lanes::add_coarsely(kernel_.tables(), test, room.nodes, total);
     room.nodes.work.clear();
     for (const std::uint32_t index : room.nodes.opened.span())
-      for (std::uint32_t c = 0; c < nodes_[index].child_count(); ++c)
-        room.nodes.work.push(nodes_[index].first_child + c);
+      room.nodes.work.push_run(nodes_[index].first_child, nodes_[index].child_count());
   }
   return total;
 }
@@ -135,12 +134,11 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   nodes.samples.clear();
   nodes.far_samples.clear();
   room.list.clear();
+  nodes.work.clear();
   if (parent)
-    nodes.work.assign(parent->pending.span());
-  else {
-    nodes.work.clear();
+    nodes.work.append(parent->pending.span());
+  else
     nodes.work.push(0);
-  }
   while (nodes.work.size() > 0) {
     nodes.scattered.clear();
     nodes.opened.clear();
@@ -156,13 +154,13 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     for (const std::uint32_t index : nodes.opened.span()) {
       const SumNode& node = nodes_[index];
       if (node.child_count() > 0)
-        for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
+        nodes.work.push_run(node.first_child, node.child_count());
       else if (is_leaf)
-        for (std::uint32_t i = 0; i < node.sample_count(); ++i) nodes.samples.push(node.first_sample + i);
+        nodes.samples.push_run(node.first_sample, node.sample_count());
       else
         target.pending.push(index);
     }
-    for (const std::uint32_t index : nodes.pending.span()) target.pending.push(index);
+    target.pending.append(nodes.pending.span());
   }
   if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
   lanes::add_series(kernel_.tables(), nodes_.data(), nodes.far.span(), target.centre, target.far);
@@ -180,7 +178,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     for (const Point& point : range) room.exitance[point.index] = eval_point(target, point, room);
     return;
   }
-  for (const std::uint32_t index : nodes.points.span()) target.pending.push(index);
+  target.pending.append(nodes.points.span());
   const int shift = 3 * (level - 1);
   for (std::size_t begin = 0; begin < range.size();) {
     std::size_t end = begin + 1;

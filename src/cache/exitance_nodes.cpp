@@ -16,6 +16,10 @@ constexpr std::size_t kRun = 8192;
 template <class Key, class Hash>
 class Numbering {
  public:
+  explicit Numbering(std::size_t expected) {
+    keys_.reserve(expected);
+    slots_.assign(std::bit_ceil(2 * expected + 64), kFree);
+  }
   std::uint32_t find_or_add(const Key& key) {
     if (2 * keys_.size() >= slots_.size()) grow();
     std::size_t slot = Hash()(key) & (slots_.size() - 1);
@@ -30,7 +34,7 @@ class Numbering {
  private:
   static constexpr std::uint32_t kFree = 0xffffffffu;
   void grow() {
-    slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kFree);
+    slots_.assign(2 * slots_.size(), kFree);
     for (std::uint32_t i = 0; i < keys_.size(); ++i) {
       std::size_t slot = Hash()(keys_[i]) & (slots_.size() - 1);
       while (slots_[slot] != kFree) slot = (slot + 1) & (slots_.size() - 1);
@@ -76,7 +80,8 @@ class ExitanceField::Divider {
       : vertices_(vertices),
         longest2_(static_cast<float>(square(distance))),
         straight2_(static_cast<float>(square(distance / 3))),
-        into_(into) {}
+        into_(into),
+        extras_(2 * (into.end - into.begin)) {}
 
   // The part for triangle `index` with these corners.
   std::uint32_t divide_triangle(std::uint32_t index, const Triangle& t) {
@@ -154,15 +159,21 @@ class ExitanceField::Divider {
 
 double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double distance) {
   double nodes = 0;
-  for (const Mesh* const mesh : meshes)
-    if (mesh) {
-      double longest = 0;  // slivers
-      for (const Triangle& t : mesh->triangles)
-        for (std::size_t i = 0; i < 3; ++i)
-          longest += double{(mesh->positions[t[i]] - mesh->positions[t[(i + 1) % 3]]).length()};
-      nodes += static_cast<double>(mesh->triangles.size()) + 2 * longest / distance +
-               10 * surface_area(*mesh) / square(distance);
-    }
+  for (const Mesh* const mesh : meshes) {
+    if (!mesh) continue;
+    const std::vector<Triangle>& triangles = mesh->triangles;
+    std::vector<double> runs((triangles.size() + kRun - 1) / kRun);
+    parallel_for(runs.size(), 1, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first * kRun; i < std::min(last * kRun, triangles.size()); ++i) {
+        const Triangle& t = triangles[i];
+        const Vec3 a = mesh->positions[t[0]], ab = mesh->positions[t[1]] - a, ac = mesh->positions[t[2]] - a;
+        // Edges count for slivers.
+        runs[i / kRun] += 1 + 2 * double{ab.length() + ac.length() + (ac - ab).length()} / distance +
+                          5 * double{ab.cross(ac).length()} / square(distance);
+      }
+    });
+    for (const double run : runs) nodes += run;
+  }
   return nodes;
 }
 
@@ -209,7 +220,10 @@ void ExitanceField::divide_meshes(double distance) {
   const auto vertices = static_cast<std::uint32_t>(positions_.size()),
              triangles = static_cast<std::uint32_t>(corners_.size());
   parts_.resize(triangles);
-  Numbering<Vec3, HashPosition> extras;
+  std::size_t extra_count = 0, patch_count = 0;
+  for (const Division& run : runs) extra_count += run.positions.size(), patch_count += run.patches.size();
+  Numbering<Vec3, HashPosition> extras(extra_count);
+  patches_.reserve(patch_count);
   std::vector<std::uint32_t> numbers;
   for (const Division& run : runs) {
     numbers.clear();
@@ -238,7 +252,7 @@ void ExitanceField::make_blocks() {
     for (std::size_t i = begin; i < end; ++i)
       codes[i] = exitance_.cell_code(positions_[i]) >> 3 * Exitance::kWholeLevel;
   });
-  Numbering<std::uint64_t, HashCode> numbers;
+  Numbering<std::uint64_t, HashCode> numbers(codes.size() / 16);
   std::vector<std::uint32_t> first_seen(codes.size());
   for (std::size_t i = 0; i < codes.size(); ++i)
     first_seen[i] = i > 0 && codes[i] == codes[i - 1] ? first_seen[i - 1] : numbers.find_or_add(codes[i]);

@@ -24,6 +24,9 @@ constexpr double kSeriesWeight = 0.2;
 // What single precision adds to a relative error: sums of 64 terms a lane, a few hundred of them a series.
 constexpr double kRounding = 3e-5;
 
+// From this tolerance on, tables are read without interpolation.
+constexpr double kMiddlesTolerance = 0.005;
+
 constexpr float kNoLimit = 1e30f;
 
 }  // namespace
@@ -68,6 +71,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
            "or --method exact",
            tolerance, tables, 2 * tables);
   }
+  if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
   make_nodes();
   make_tables();
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nacre/base/parallel.h"
+
 namespace nacre {
 namespace {
 
@@ -31,10 +33,6 @@ const std::array<float, kDiscCells + 1>& disc_table() {
   return table;
 }
 
-struct JetValues {
-  double radial, bend;
-};
-
 float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 }  // namespace
@@ -58,75 +56,102 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
   const std::uint32_t first = bits(static_cast<float>(std::max(start * start, 1e-36))) >> 23;
   const std::uint32_t last = bits(static_cast<float>(std::min(widest * widest, 1e36))) >> 23;
 
+  const auto octaves = static_cast<std::size_t>(last - first) + 1;
+  make_cells(profiles, first, octaves);
+  make_bounds(profiles, first, octaves, start);
+  make_jets(profiles, first, octaves);
+}
+
+// Cells are evaluated at their near edges, side by side, then joined.
+void Kernel::make_cells(const std::array<Profile, 3>& profiles, std::uint32_t first, std::size_t octaves) {
   first_cell_ = (first << kCellBits) - 1;
-  const std::size_t cell_count = (static_cast<std::size_t>(last - first) + 1) << kCellBits;
-  cells_.resize(cell_count + 2);
-  const auto value_at = [&](std::size_t channel, double r) { return eval_profile(profiles[channel], r); };
-  for (std::size_t k = 0; k < 3; ++k) {
-    double previous = 0;
-    for (std::size_t i = 0; i <= cell_count; ++i) {
-      const auto edge_bits = static_cast<std::uint32_t>((first_cell_ + 1 + i) << (23 - kCellBits));
-      const double value = value_at(k, std::sqrt(static_cast<double>(r2_of_bits(edge_bits))));
-      if (i == 0) {
-        cells_[0].value[k] = static_cast<float>(value);
-        cells_[0].delta[k] = 0;
-      } else {
-        cells_[i].value[k] = static_cast<float>(previous);
-        cells_[i].delta[k] = static_cast<float>(value - previous);
-      }
-      previous = value;
+  cells_.resize((octaves << kCellBits) + 2);
+  const std::size_t count = cells_.size() - 1;
+  parallel_for(count - 1, 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin + 1; i < end + 1; ++i) {
+      const double r =
+          std::sqrt(double{r2_of_bits((first_cell_ + static_cast<std::uint32_t>(i)) << (23 - kCellBits))});
+      for (std::size_t k = 0; k < 3; ++k)
+        cells_[i].value[k] = static_cast<float>(eval_profile(profiles[k], r));
     }
-  }
+  });
+  cells_[0].value = cells_[1].value;
+  cells_[0].delta = broadcast(0);
+  const double end =
+      std::sqrt(double{r2_of_bits((first_cell_ + static_cast<std::uint32_t>(count)) << (23 - kCellBits))});
+  Float4 beyond = broadcast(0);
+  for (std::size_t k = 0; k < 3; ++k) beyond[k] = static_cast<float>(eval_profile(profiles[k], end));
+  for (std::size_t i = 1; i < count; ++i)
+    cells_[i].delta = (i + 1 < count ? cells_[i + 1].value : beyond) - cells_[i].value;
+  cells_[count].value = cells_[count].delta = broadcast(0);
+}
 
-  // Bounds per cell are taken at its near edge and made monotone from the far end; the maximum within a cell
-  // is at most a little above that at its edges, which eight points inside find, with 2 % to spare.
+// Bounds per cell are taken at its near edge and made monotone from the far end; the maximum within a cell is
+// at most a little above that at its edges, which eight points inside find, with 2 % to spare.
+void Kernel::make_bounds(const std::array<Profile, 3>& profiles, std::uint32_t first, std::size_t octaves,
+                         double start) {
   first_bound_ = (first << kBoundBits) - 1;
-  const std::size_t bound_count = (static_cast<std::size_t>(last - first) + 1) << kBoundBits;
-  bounds_.resize(bound_count + 2);
-  for (std::size_t k = 0; k < 3; ++k) {
-    double hessian = 0, slope = 0, third = 0;
-    for (std::size_t i = bound_count + 1; i-- > 0;) {
-      const auto near_bits = static_cast<std::uint32_t>((first_bound_ + i) << (23 - kBoundBits));
-      const double low = i == 0 ? 0 : std::sqrt(static_cast<double>(r2_of_bits(near_bits)));
-      const double high = std::sqrt(static_cast<double>(r2_of_bits(near_bits + (1u << (23 - kBoundBits)))));
-      for (int step = 0; step <= 8; ++step) {
-        const double r = std::max(low + (high - low) * step / 8, 1e-3 * start);
-        const ProfileValue v = eval_profile_derivatives(profiles[k], r);
-        hessian = std::max({hessian, 1.02 * std::abs(v.curvature), 1.02 * std::abs(v.slope) / r});
-        slope = std::max(slope, 1.02 * std::abs(v.slope));
-        // Along the radius by differences; of c s^2, that of an angle, the most is 2 / sqrt(27).
-        const double h = 1e-3 * r;
-        const double along = (eval_profile_derivatives(profiles[k], r + h).curvature -
-                              eval_profile_derivatives(profiles[k], r - h).curvature) /
-                             (2 * h);
-        const double across = (v.curvature - v.slope / r) / r;
-        third = std::max(third, 1.05 * (std::abs(along) + 2 / std::sqrt(3.0) * std::abs(across)));
+  bounds_.resize((octaves << kBoundBits) + 2);
+  const auto at_most = [](double x) { return static_cast<float>(std::min(x, 1e30)); };
+  parallel_for(bounds_.size() - 1, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto near_bits = (first_bound_ + static_cast<std::uint32_t>(i)) << (23 - kBoundBits);
+      const double low = i == 0 ? 0 : std::sqrt(double{r2_of_bits(near_bits)});
+      const double high = std::sqrt(double{r2_of_bits(near_bits + (1u << (23 - kBoundBits)))});
+      for (std::size_t k = 0; k < 3; ++k) {
+        double hessian = 0, slope = 0, third = 0;
+        for (int step = 0; step <= 8; ++step) {
+          const double r = std::max(low + (high - low) * step / 8, 1e-3 * start);
+          const ProfileValue v = eval_profile_derivatives(profiles[k], r);
+          hessian = std::max({hessian, std::abs(v.curvature), std::abs(v.slope) / r});
+          slope = std::max(slope, std::abs(v.slope));
+          // Along the radius by differences; of c s^2, that of an angle, the most is 2 / sqrt(27).
+          const double h = 1e-3 * r;
+          const double along = (eval_profile_derivatives(profiles[k], r + h).curvature -
+                                eval_profile_derivatives(profiles[k], r - h).curvature) /
+                               (2 * h);
+          const double across = (v.curvature - v.slope / r) / r;
+          third = std::max(third, std::abs(along) + 2 / std::sqrt(3.0) * std::abs(across));
+        }
+        bounds_[i].hessian[k] = at_most(1.02 * hessian);
+        bounds_[i].slope[k] = at_most(1.02 * slope);
+        bounds_[i].third[k] = at_most(1.05 * third);
       }
-      bounds_[i].hessian[k] = static_cast<float>(std::min(hessian, 1e30));
-      bounds_[i].third[k] = static_cast<float>(std::min(third, 1e30));
-      bounds_[i].slope[k] = static_cast<float>(std::min(slope, 1e30));
     }
-  }
+  });
+  for (std::size_t i = bounds_.size() - 1; i-- > 0;)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Bounds& far = bounds_[i + 1];
+      bounds_[i].hessian[k] = std::max(bounds_[i].hessian[k], far.hessian[k]);
+      bounds_[i].slope[k] = std::max(bounds_[i].slope[k], far.slope[k]);
+      bounds_[i].third[k] = std::max(bounds_[i].third[k], far.third[k]);
+    }
+}
 
+// The cell before the table's start holds what is there, flat.
+void Kernel::make_jets(const std::array<Profile, 3>& profiles, std::uint32_t first, std::size_t octaves) {
   first_jet_ = (first << kJetBits) - 1;
-  jets_.resize(((static_cast<std::size_t>(last - first) + 1) << kJetBits) + 2);
-  for (std::size_t k = 0; k < 3; ++k) {
-    JetValues previous{0, 0};
-    for (std::size_t i = 0; i + 1 < jets_.size(); ++i) {
-      // The cell before the table's start holds what is there.
-      const auto far_bits = static_cast<std::uint32_t>((first_jet_ + i + 1) << (23 - kJetBits));
-      const double r = std::sqrt(static_cast<double>(r2_of_bits(far_bits)));
-      const ProfileValue v = eval_profile_derivatives(profiles[k], r);
-      const JetValues next{std::clamp(v.slope / r, -1e30, 1e30),
-                           std::clamp((v.curvature - v.slope / r) / square(r), -1e30, 1e30)};
-      if (i == 0) previous = next;
-      jets_[i].radial[k] = static_cast<float>(previous.radial);
-      jets_[i].radial_delta[k] = static_cast<float>(next.radial - previous.radial);
-      jets_[i].bend[k] = static_cast<float>(previous.bend);
-      jets_[i].bend_delta[k] = static_cast<float>(next.bend - previous.bend);
-      previous = next;
+  jets_.resize((octaves << kJetBits) + 2);
+  const std::size_t count = jets_.size() - 1;
+  parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto bits = (first_jet_ + static_cast<std::uint32_t>(std::max<std::size_t>(i, 1)))
+                        << (23 - kJetBits);
+      const double r = std::sqrt(double{r2_of_bits(bits)});
+      for (std::size_t k = 0; k < 3; ++k) {
+        const ProfileValue v = eval_profile_derivatives(profiles[k], r);
+        jets_[i].radial[k] = static_cast<float>(std::clamp(v.slope / r, -1e30, 1e30));
+        jets_[i].bend[k] =
+            static_cast<float>(std::clamp((v.curvature - v.slope / r) / square(r), -1e30, 1e30));
+      }
     }
+  });
+  for (std::size_t i = 0; i + 1 < count; ++i) {
+    jets_[i].radial_delta = jets_[i + 1].radial - jets_[i].radial;
+    jets_[i].bend_delta = jets_[i + 1].bend - jets_[i].bend;
   }
+  jets_[count - 1].radial_delta = jets_[count - 1].bend_delta = broadcast(0);
+  jets_[count] = {broadcast(0), broadcast(0), broadcast(0), broadcast(0)};
 }
 
 KernelTables Kernel::tables() const noexcept {
@@ -135,14 +160,27 @@ KernelTables Kernel::tables() const noexcept {
     return DistanceBins{static_cast<std::int32_t>(first), static_cast<std::int32_t>(first + count - 1),
                         shift};
   };
-  return {reinterpret_cast<const float*>(cells_.data()),
-          reinterpret_cast<const float*>(jets_.data()),
+  const bool interpolated = cell_middles_.empty();
+  return {interpolated ? reinterpret_cast<const float*>(cells_.data())
+                       : reinterpret_cast<const float*>(cell_middles_.data()),
+          interpolated ? reinterpret_cast<const float*>(jets_.data())
+                       : reinterpret_cast<const float*>(jet_middles_.data()),
+          interpolated,
           bins(first_cell_, cells_.size(), 23 - kCellBits),
           bins(first_jet_, jets_.size(), 23 - kJetBits),
           singular_,
           disc_table().data(),
           static_cast<float>(kDiscCells) / kDiscReach,
           kDiscReach};
+}
+
+void Kernel::make_middles() {
+  const Float4 half = broadcast(0.5f);
+  for (const Cell& cell : cells_) cell_middles_.push_back(cell.value + half * cell.delta);
+  for (const JetCell& jet : jets_) {
+    jet_middles_.push_back(jet.radial + half * jet.radial_delta);
+    jet_middles_.push_back(jet.bend + half * jet.bend_delta);
+  }
 }
 
 double Kernel::relative_error(float distance) const noexcept {

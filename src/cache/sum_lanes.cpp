@@ -34,10 +34,26 @@ HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
                  hn::Set(df, 1.0f / static_cast<float>(1 << bins.shift)));
 }
 
-HWY_INLINE VF interpolate(const float* table, VI offset, VF fraction) {
-  const F df;
-  return hn::MulAdd(fraction, hn::GatherIndex(df, table + 4, offset), hn::GatherIndex(df, table, offset));
-}
+// Rows of a table at squared distances: fields of a row are 4 floats, one for each channel, followed by their
+// differences to the next row if the table is interpolated.
+template <bool kInterpolated, int kFieldsLog2>
+struct Rows {
+  const float* table;
+  VI offset;
+  VF fraction;
+
+  HWY_INLINE Rows(const float* first, const DistanceBins& bins, VF r2)
+      : table(first), offset(hn::ShiftLeft<2 + kFieldsLog2 + kInterpolated>(find_cell(bins, r2))) {
+    if constexpr (kInterpolated) fraction = find_fraction(bins, r2);
+  }
+  HWY_INLINE VF operator()(int field, int channel) const {
+    const F df;
+    const float* const at = table + (kInterpolated ? 8 : 4) * field + channel;
+    const VF value = hn::GatherIndex(df, at, offset);
+    if constexpr (kInterpolated) return hn::MulAdd(fraction, hn::GatherIndex(df, at + 4, offset), value);
+    return value;
+  }
+};
 
 HWY_INLINE VF length2(VF x, VF y, VF z) { return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))); }
 
@@ -60,8 +76,9 @@ HWY_INLINE VF disc_distance2(const KernelTables& kernel, VF r2, VF area) {
   return hn::IfThenElse(inside, hn::Mul(effective, effective), r2);
 }
 
-void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
-                 std::array<double, 3>& total) {
+template <bool kInterpolated>
+HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, const Vec3& x,
+                         std::array<double, 3>& total) {
   const F df;
   // Runs of a few terms are kept by floats; the whole is added up in double precision.
   constexpr std::size_t kRun = 64;
@@ -74,16 +91,23 @@ void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3&
       VF r2 = length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
                       hn::Sub(load(SourceList::kZ), cz));
       if (kernel.singular) r2 = disc_distance2(kernel, r2, load(SourceList::kArea));
-      const VF fraction = find_fraction(kernel.cell_bins, r2);
-      const VI cell = hn::ShiftLeft<3>(find_cell(kernel.cell_bins, r2));
-      r = hn::MulAdd(interpolate(kernel.cells, cell, fraction), load(SourceList::kR), r);
-      g = hn::MulAdd(interpolate(kernel.cells + 1, cell, fraction), load(SourceList::kG), g);
-      b = hn::MulAdd(interpolate(kernel.cells + 2, cell, fraction), load(SourceList::kB), b);
+      const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
+      r = hn::MulAdd(row(0, 0), load(SourceList::kR), r);
+      g = hn::MulAdd(row(0, 1), load(SourceList::kG), g);
+      b = hn::MulAdd(row(0, 2), load(SourceList::kB), b);
     }
     total[0] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, r)));
     total[1] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, g)));
     total[2] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, b)));
   }
+}
+
+void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
+                 std::array<double, 3>& total) {
+  if (kernel.interpolated)
+    add_list<true>(kernel, list, x, total);
+  else
+    add_list<false>(kernel, list, x, total);
 }
 
 // A vector of indices, the last one repeated, and which of them are new.
@@ -189,7 +213,7 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
   }
 }
 
-template <int kPower, class Struct>
+template <bool kInterpolated, int kPower, class Struct>
 HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
                             std::span<const std::uint32_t> far, const Vec3& centre,
                             LocalExpansion& expansion) {
@@ -204,15 +228,13 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
     const Fields source = gather(structs, batch.index);
     const VF x = hn::Sub(cx, source(0)), y = hn::Sub(cy, source(1)), z = hn::Sub(cz, source(2));
     const VF r2 = length2(x, y, z);
-    const VI cell = hn::ShiftLeft<3>(find_cell(kernel.cell_bins, r2));
-    const VF fraction = find_fraction(kernel.cell_bins, r2);
-    const VI jet = hn::ShiftLeft<4>(find_cell(kernel.jet_bins, r2));
-    const VF jet_fraction = find_fraction(kernel.jet_bins, r2);
+    const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
+    const Rows<kInterpolated, 1> jet(kernel.jets, kernel.jet_bins, r2);
     for (int k = 0; k < 3; ++k) {
       const VF power = hn::IfThenElseZero(batch.valid, source(kPower + k));
-      const VF value = interpolate(kernel.cells + k, cell, fraction);
-      const VF radial = hn::Mul(power, interpolate(kernel.jets + k, jet, jet_fraction));
-      const VF bend = hn::Mul(power, interpolate(kernel.jets + 8 + k, jet, jet_fraction));
+      const VF value = row(0, k);
+      const VF radial = hn::Mul(power, jet(0, k));
+      const VF bend = hn::Mul(power, jet(1, k));
       VF(&s)[10] = sums[k];
       s[0] = hn::MulAdd(power, value, s[0]);
       s[1] = hn::MulAdd(radial, x, s[1]);
@@ -237,15 +259,22 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
 
 void add_node_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                      const Vec3& centre, LocalExpansion& expansion) {
-  add_structs<kNodePower>(kernel, nodes, far, centre, expansion);
+  if (kernel.interpolated)
+    add_structs<true, kNodePower>(kernel, nodes, far, centre, expansion);
+  else
+    add_structs<false, kNodePower>(kernel, nodes, far, centre, expansion);
 }
 void add_sample_series(const KernelTables& kernel, const SumSource* sources,
                        std::span<const std::uint32_t> far, const Vec3& centre, LocalExpansion& expansion) {
-  add_structs<kSourcePower>(kernel, sources, far, centre, expansion);
+  if (kernel.interpolated)
+    add_structs<true, kSourcePower>(kernel, sources, far, centre, expansion);
+  else
+    add_structs<false, kSourcePower>(kernel, sources, far, centre, expansion);
 }
 
-std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
-                           Float4& total) {
+template <bool kInterpolated>
+HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
+                                   Float4& total) {
   const F df;
   const std::size_t lanes = hn::Lanes(df), count = lists.work.size();
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
@@ -264,14 +293,18 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
     const VF distance = test.certified ? hn::Add(hn::Add(r, radius), hn::Set(df, test.slack))
                                        : hn::Max(hn::Max(r, radius), hn::Set(df, test.slack));
     const VF r2 = hn::Mul(distance, distance);
-    const VF fraction = find_fraction(kernel.cell_bins, r2);
-    const VI cell = hn::ShiftLeft<3>(find_cell(kernel.cell_bins, r2));
+    const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
     for (int k = 0; k < 3; ++k)
-      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, node(kNodePower + k)),
-                           interpolate(kernel.cells + k, cell, fraction), sums[k]);
+      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, node(kNodePower + k)), row(0, k), sums[k]);
   }
   for (int k = 0; k < 3; ++k) total[k] += hn::GetLane(hn::SumOfLanes(df, sums[k]));
   return added;
+}
+
+std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
+                           Float4& total) {
+  return kernel.interpolated ? add_nodes<true>(kernel, test, lists, total)
+                             : add_nodes<false>(kernel, test, lists, total);
 }
 
 void least_of_channels(const std::array<const float*, 3>& a, const std::array<const float*, 3>& b,

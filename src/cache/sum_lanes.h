@@ -43,10 +43,15 @@ class IndexList {
     if (size_ >= indices_.size()) indices_.resize(2 * size_ + 64);
     indices_[size_++] = index;
   }
-  void assign(std::span<const std::uint32_t> from) {
-    clear();
+  /// `first` and those that follow it.
+  void push_run(std::uint32_t first, std::uint32_t count) {
+    std::uint32_t* const to = room(count);
+    for (std::uint32_t i = 0; i < count; ++i) to[i] = first + i;
+    size_ += count;
+  }
+  void append(std::span<const std::uint32_t> from) {
     std::copy(from.begin(), from.end(), room(from.size()));
-    size_ = from.size();
+    size_ += from.size();
   }
   /// Room for `count` more and for what a vector store may spill; `grow` says how many were written.
   std::uint32_t* room(std::size_t count) {
