@@ -5,6 +5,7 @@
 #include "common.h"
 #include "nacre/cache/blotch.h"
 #include "nacre/cache/cache_file.h"
+#include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
 #include "nacre/geometry/mesh_file.h"
 #include "nacre/geometry/topology.h"
@@ -53,6 +54,21 @@ void show_density(const CacheGroup& group, double mm_per_unit) {
       hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * mm_per_unit;
   fmt::print("  spacing {:.4g} mm: serves mean free paths down to {:.3g} mm\n", spacing,
              spacing / spacing_for_blotch(kAcceptableBlotch));
+}
+
+void show_exitance(const std::string& path) {
+  const std::vector<KeptExitance> media = load_exitance(path);
+  fmt::print("exitance {}: format version {}, sound\n", path, kExitanceVersion);
+  for (const KeptExitance& kept : media) {
+    if (kept.key.empty()) {
+      fmt::print("a medium of which nothing is kept\n");
+      continue;
+    }
+    const auto filled = std::ranges::count(kept.filled, 1);
+    fmt::print("{} nodes in {} blocks, {} of them evaluated; made for\n", kept.values.size(),
+               kept.filled.size(), filled);
+    for (const auto& [key, value] : kept.key) fmt::print("  {}: {}\n", key, value);
+  }
 }
 
 void show_group(const CacheGroup& group, const KeyValues& info) {
@@ -154,7 +170,9 @@ void run(const Options& options, const std::string& command_line) {
   const std::string& path = options.scene.path;
   const std::string extension = std::filesystem::path(path).extension().string();
   bool flawed = false;
-  if (is_cache_file(path) || extension == ".nacre")
+  if (is_exitance_file(path))
+    show_exitance(path);
+  else if (is_cache_file(path) || extension == ".nacre")
     show_cache(path);
   else if (extension == ".exr" || extension == ".EXR")
     show_image(path);
@@ -170,8 +188,8 @@ void run(const Options& options, const std::string& command_line) {
 
 void add_info_command(CLI::App& app, const std::string& command_line) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("info", "Say what a scene, mesh, cache or image holds and whether it is sound");
+  CLI::App* command = app.add_subcommand(
+      "info", "Say what a scene, mesh, cache, file of exitance or image holds and whether it is sound");
   add_scene_options(*command, options->scene);
   command->add_flag("--check", options->check, "Exit with 1 when something is wrong with it");
   add_common_options(*command, options->common);

@@ -16,7 +16,7 @@ namespace {
 constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.35f;
 
 // Points per cell above which smaller ones are cheaper.
-constexpr std::size_t kPointsPerCell = 32;
+constexpr std::size_t kPointsPerCell = 40;
 
 }  // namespace
 

@@ -15,11 +15,11 @@ namespace {
 // that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
 // shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
 // a relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 13;
+constexpr double kCalibration = 11.5;
 
 // A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
 // share of the bound on its third derivatives.
-constexpr double kSeriesWeight = 0.2;
+constexpr double kSeriesWeight = 0.1;
 
 // What single precision adds to a relative error: sums of 64 terms a lane, a few hundred of them a series.
 constexpr double kRounding = 3e-5;

@@ -113,6 +113,8 @@ Image Renderer::render(const RenderParams& params, Progress& progress, Report& r
   report.counts["rays"] += totals.rays;
   report.counts["shading_points"] += totals.shading_points;
   report.counts["kernel_evaluations"] += totals.evaluations;
+  for (std::size_t m = 0; m < media_.size(); ++m)
+    report.notes["diffusion of " + medium_label(*world_.scene, m)] = media_[m].describe_path();
   for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
   return pixels.make_image(params);

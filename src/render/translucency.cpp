@@ -26,6 +26,7 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
       single_samples_(params.single_samples),
       mc_samples_(params.mc_samples),
       tolerance_(params.tolerance),
+      certified_(params.certified),
       group_(group) {
   const Medium& m = world.scene->media[medium];
   const auto profiles = make_profiles(m);
@@ -57,6 +58,24 @@ void Translucency::make_field(const CacheGroup& group, double tolerance) {
   const double distance = ExitanceField::node_distance(tolerance) * length;
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
+}
+
+std::string Translucency::describe_path() const {
+  switch (method_) {
+    case Method::kExact:
+      return "sum over every sample";
+    case Method::kMonteCarlo:
+      return "Monte Carlo over the surface";
+    case Method::kLambert:
+      return "opaque surface";
+    case Method::kHierarchical:
+      break;
+  }
+  if (tolerance_ == 0) return "sum over every sample";
+  if (field_)
+    return fmt::format("interpolated, {} of {} nodes evaluated", field_->filled_node_count(),
+                       field_->node_count());
+  return certified_ ? "hierarchical at every point, certified" : "hierarchical at every point";
 }
 
 // All that M_o depends on, by name.

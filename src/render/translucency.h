@@ -38,6 +38,8 @@ class Translucency {
   void fill(std::uint64_t& evaluations) const {
     if (field_) field_->fill(evaluations);
   }
+  /// How diffusion is evaluated, in words for the report.
+  std::string describe_path() const;
   /// What is evaluated so far, or an empty key where nothing is kept; the blocks of its nodes.
   KeptExitance keep() const;
   std::vector<std::uint32_t> block_of_node() const {
@@ -63,6 +65,7 @@ class Translucency {
   Rgb total_;  // of the profile
   int bounces_, light_samples_, single_samples_, mc_samples_;
   double tolerance_;
+  bool certified_;
   const CacheGroup* group_;
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;

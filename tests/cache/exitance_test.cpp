@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "cache/sample_sets.h"
+#include "nacre/base/error.h"
 
 namespace nacre {
 namespace {
@@ -167,6 +168,83 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
                   << preset << " " << shape.name << " " << lighting.name;
             }
           }
+        }
+      }
+}
+
+// Every point and channel, not their mean; as far from the exact sum as the tables let one say.
+TEST_P(EveryKind, CertifiedErrorIsWithinTheToleranceEverywhere) {
+  for (const char* preset : {"Marble", "Skin1", "Ketchup"})
+    for (const Shape& shape : kShapes)
+      for (const Lighting& lighting : kLightings) {
+        const SurfaceSamples samples = shape.make(shape.n / 2, lighting.light);
+        const OwnedGroup owned = make_group(samples);
+        const float scale = default_scale(preset, samples);
+        for (const float coarser : {1.0f, 4.0f}) {
+          const Medium medium = make_material(preset, GetParam(), scale / coarser);
+          const Exitance exact(owned.group, medium, 0);
+          std::vector<Vec3> points;
+          Rng rng(15);
+          for (int i = 0; i < 100; ++i) points.push_back(shape.point(rng));
+          for (const double tolerance : {0.5, 0.05, 0.01}) {
+            const Exitance fast(owned.group, medium, tolerance, Promise::kCertified);
+            std::uint64_t evaluations = 0;
+            const std::vector<Rgb> values = eval(fast, points, evaluations);
+            for (std::size_t i = 0; i < points.size(); ++i) {
+              const Rgb expected = eval(exact, points[i]);
+              for (int k = 0; k < 3; ++k)
+                ASSERT_LE(std::abs(double{values[i][k]} - double{expected[k]}),
+                          tolerance * double{expected[k]})
+                    << preset << ", " << shape.name << ", " << lighting.name << ", tolerance " << tolerance;
+            }
+            if (tolerance == 0.5) {
+              EXPECT_LT(evaluations, points.size() * samples.size()) << preset << " " << shape.name;
+            }
+          }
+        }
+      }
+}
+
+TEST_P(EveryKind, TolerancesBelowTheAccuracyOfTablesAreNotCertified) {
+  const OwnedGroup owned = make_group(make_plane(20, &uniform_light));
+  const Medium medium = make_material("Marble", GetParam(), 20);
+  try {
+    const Exitance exitance(owned.group, medium, 1e-5, Promise::kCertified);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kLimit);
+    EXPECT_NE(std::string(error.what()).find("certified"), std::string::npos) << error.what();
+  }
+}
+
+// Points that are all there is in their blocks: the error is the same, whatever the density of points.
+TEST_P(EveryKind, WholeBlocksAreWithinTheTolerance) {
+  for (const char* preset : {"Marble", "Ketchup"})
+    for (const Shape& shape : kShapes)
+      for (const Lighting& lighting : kLightings) {
+        const SurfaceSamples samples = shape.make(shape.n / 2, lighting.light);
+        const OwnedGroup owned = make_group(samples);
+        const Medium medium = make_material(preset, GetParam(), default_scale(preset, samples));
+        const Exitance fast(owned.group, medium, 0.01), exact(owned.group, medium, 0);
+        for (const int count : {100, 20000}) {
+          std::vector<Vec3> points;
+          Rng rng(25);
+          for (int i = 0; i < count; ++i) points.push_back(shape.point(rng));
+          std::vector<Rgb> values(points.size());
+          std::uint64_t evaluations = 0;
+          fast.eval_whole(points, values, evaluations);
+          double error[3]{}, norm[3]{};
+          for (std::size_t i = 0; i < points.size(); i += points.size() / 100) {
+            const Rgb expected = eval(exact, points[i]);
+            for (int k = 0; k < 3; ++k) {
+              error[k] += square(double{values[i][k]} - double{expected[k]});
+              norm[k] += square(double{expected[k]});
+            }
+          }
+          for (int k = 0; k < 3; ++k)
+            EXPECT_LE(std::sqrt(error[k]), 0.01 * std::sqrt(norm[k]))
+                << preset << ", " << shape.name << ", " << lighting.name << ", " << count << ", channel "
+                << k;
         }
       }
 }

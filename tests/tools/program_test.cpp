@@ -106,12 +106,45 @@ TEST_F(Program, SingleScatteringAndMethodsHaveTheirOptions) {
 
 TEST_F(Program, OptionsWithNothingToActOnAreRefused) {
   run("bake s.xml -o s.cache");
-  for (const char* options : {"--method montecarlo --cache s.cache", "--method lambert --spacing 1",
-                              "--mc-samples 4", "--mc-sampling uniform", "--method exact --tolerance 0.1",
-                              "--method exact --verify 9", "--method montecarlo --interreflect",
-                              "--method lambert --single-samples 2", "--cache s.cache --interreflect"})
+  for (const char* options :
+       {"--method montecarlo --cache s.cache", "--method lambert --spacing 1", "--mc-samples 4",
+        "--mc-sampling uniform", "--method exact --tolerance 0.1", "--method exact --verify 9",
+        "--method exact --certified", "--method lambert --exitance e", "--certified --exitance e",
+        "--simd mmx", "--method montecarlo --interreflect", "--method lambert --single-samples 2",
+        "--cache s.cache --interreflect"})
     EXPECT_EQ(run_nacre(folder_, std::string("render s.xml -o x.exr ") + options).exit_code, 2) << options;
   EXPECT_FALSE(std::filesystem::exists(folder_.file("x.exr")));
+}
+
+// What one command has evaluated is there for the next, for another camera, too; the pictures are the same.
+TEST_F(Program, ExitanceIsKept) {
+  run("bake s.xml -o s.cache");
+  run("render s.xml --cache s.cache -o plain.exr --size 24x24");
+  run("render s.xml --cache s.cache -o part.exr --size 24x24 --crop 0,0,12x24 --exitance e.exitance");
+  const auto part = std::filesystem::file_size(folder_.file("e.exitance"));
+  run("render s.xml --cache s.cache -o first.exr --size 24x24 --exitance e.exitance");
+  run("render s.xml --cache s.cache -o second.exr --size 24x24 --exitance e.exitance --report r.json");
+  EXPECT_EQ(nlohmann::json::parse(read_file(folder_.file("r.json")))["counts"]["kernel_evaluations"], 0);
+  EXPECT_EQ(std::filesystem::file_size(folder_.file("e.exitance")), part);
+  expect_identical("plain.exr", "first.exr");
+  expect_identical("plain.exr", "second.exr");
+  const auto refused =
+      run_nacre(folder_, "render s.xml --cache s.cache -o x.exr --exitance e.exitance -D sigma_a=0.2");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.output.find("sigma_a"), std::string::npos) << refused.output;
+  const auto info = run_nacre(folder_, "info e.exitance");
+  EXPECT_EQ(info.exit_code, 0) << info.output;
+}
+
+TEST_F(Program, CertifiedPicturesAreNearerThanTheToleranceEverywhere) {
+  run("bake s.xml -o s.cache");
+  run("render s.xml --cache s.cache -o exact.exr --method exact --single-samples 0");
+  run("render s.xml --cache s.cache -o bound.exr --certified --tolerance 0.05 --single-samples 0");
+  const Image exact = image("exact.exr"), bound = image("bound.exr");
+  for (const char* k : {"diffusion.R", "diffusion.G", "diffusion.B"}) {
+    const auto &a = find_channel(exact, k)->values, &b = find_channel(bound, k)->values;
+    for (std::size_t i = 0; i < a.size(); ++i) ASSERT_LE(std::abs(a[i] - b[i]), 0.05f * a[i]) << k << i;
+  }
 }
 
 // Without shadows the cache and the picture have to agree about that.

@@ -1,0 +1,111 @@
+// label: unit
+// Every set of vector instructions against plain loops in double precision, and against each other.
+#include "cache/sum_lanes.h"
+
+#include <gtest/gtest.h>
+
+#include "cache/sample_sets.h"
+#include "nacre/base/simd.h"
+
+namespace nacre {
+namespace {
+
+using namespace testing_support;
+
+class EveryTarget : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override { ASSERT_TRUE(choose_simd_target(GetParam())); }
+  void TearDown() override { choose_simd_target(simd_targets().front()); }
+};
+INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(simd_targets()),
+                         [](const auto& target) { return target.param; });
+
+TEST(Simd, ScalarIsAlwaysThereAndOthersAreRefused) {
+  EXPECT_EQ(simd_targets().back(), "scalar");
+  EXPECT_FALSE(choose_simd_target("mmx"));
+  EXPECT_EQ(simd_target(), simd_targets().front());
+}
+
+std::vector<SumSource> make_sources(std::size_t count) {
+  Rng rng(4);
+  std::vector<SumSource> sources;
+  for (std::size_t i = 0; i < count; ++i)
+    sources.push_back({rng.next_float(), rng.next_float(), rng.next_float(), 1e-3f * rng.next_float(),
+                       Float4{rng.next_float(), 2 * rng.next_float(), rng.next_float(), 0}});
+  return sources;
+}
+
+// Lists of every length around whole vectors and runs, with the point right at a source, too.
+TEST_P(EveryTarget, SumsAListAsAPlainLoopDoes) {
+  for (const ProfileKind kind :
+       {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized}) {
+    const Kernel kernel(make_profiles(make_material("Marble", kind, 3)));
+    for (const std::size_t count : {1, 3, 4, 7, 8, 15, 16, 17, 63, 64, 65, 1023, 1024, 1025, 5000}) {
+      const std::vector<SumSource> sources = make_sources(count);
+      SourceList list;
+      list.add(sources);
+      list.pad();
+      for (const Vec3& x :
+           {Vec3(0.5f, 0.4f, 0.3f), Vec3(9, 0, 0), Vec3(sources[0].x, sources[0].y, sources[0].z)}) {
+        std::array<double, 3> sum{1, 2, 3}, expected = sum;
+        lanes::add_sources(kernel.tables(), list, x, sum);
+        for (const SumSource& s : sources) {
+          const float r2 = (x - Vec3(s.x, s.y, s.z)).length2();
+          const Float4 value = kernel.singular() ? kernel.eval_disc(r2, s.area) : kernel.eval(r2);
+          for (std::size_t k = 0; k < 3; ++k)
+            expected[k] += double{value[static_cast<int>(k)]} * double{s.power[static_cast<int>(k)]};
+        }
+        for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(sum[k] / expected[k], 1, 1e-5) << count << " " << k;
+      }
+    }
+  }
+}
+
+// The series of a few nodes, near its centre, is their sum.
+TEST_P(EveryTarget, AddsSeriesAsTheyAre) {
+  Kernel kernel(make_profiles(make_material("Skin1", ProfileKind::kDipole, 1)));
+  const std::vector<SumSource> sources = make_sources(37);
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t i = 0; i < sources.size(); ++i) all.push_back(i);
+  const Vec3 centre(2.2f, 1.9f, -1.4f);
+  LocalExpansion expected;
+  for (const SumSource& s : sources) {
+    const Vec3 offset = centre - Vec3(s.x, s.y, s.z);
+    expected.add(s.power, kernel.eval_jet(offset.length2()), offset);
+  }
+  const auto compare = [&](double tolerance) {
+    LocalExpansion expansion;
+    lanes::add_series(kernel.tables(), sources.data(), all, centre, expansion);
+    for (const Vec3& at : {Vec3(0, 0, 0), Vec3(0.2f, -0.1f, 0.1f), Vec3(-0.1f, 0.2f, 0.3f)})
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(expansion.eval(at)[k] / expected.eval(at)[k], 1, tolerance) << k;
+  };
+  compare(1e-5);
+  kernel.make_middles();  // every term by 0.3 %, its derivatives by 3 % at most
+  compare(3e-3);
+}
+
+// Whatever the instructions, a value depends on the same nodes; what is left is rounding.
+TEST_P(EveryTarget, EvaluatesExitanceAlike) {
+  for (const ProfileKind kind : {ProfileKind::kDipole, ProfileKind::kNormalized})
+    for (const Promise promise : {Promise::kCalibrated, Promise::kCertified}) {
+      const OwnedGroup owned = make_group(make_sphere(48, &coloured_light));
+      const Exitance exitance(owned.group, make_material("Marble", kind, 8), 0.02, promise);
+      std::vector<Vec3> points;
+      Rng rng(8);
+      for (int i = 0; i < 300; ++i)
+        points.push_back(
+            Vec3(rng.next_float() - 0.5f, rng.next_float() - 0.5f, rng.next_float() - 0.5f).normalized());
+      std::vector<Rgb> values(points.size()), plain(points.size());
+      std::uint64_t evaluations = 0;
+      exitance.eval(points, values, evaluations);
+      choose_simd_target("scalar");
+      exitance.eval(points, plain, evaluations);
+      choose_simd_target(GetParam());
+      for (std::size_t i = 0; i < points.size(); ++i)
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(values[i][k] / plain[i][k], 1, 2e-5f) << i << " " << k;
+    }
+}
+
+}  // namespace
+}  // namespace nacre
