@@ -13,7 +13,7 @@ namespace {
 
 // Nodes are opened for the guess of a sum if seen under more than this ratio of radius to distance, and for
 // its lower bound.
-constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.35f;
+constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 
 // Points per cell above which smaller ones are cheaper.
 constexpr std::size_t kPointsPerCell = 40;
@@ -101,7 +101,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
 
   const Float4 total = weigh(target, room);
   Rgb share(0, 0, 0);
-  const double factor = promise_ == Promise::kCertified ? allowance_ : 0.5 * allowance_;
+  const double factor = 0.5 * allowance_;
   for (int k = 0; k < 3; ++k)
     if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * total[k] / nodes_[0].power[k];
   const double classes =
@@ -119,16 +119,17 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   limits(radius.in_series, room.in_series);
 
   SortedNodes& nodes = room.nodes;
-  const NodeTest test{nodes_.data(),
-                      target.centre,
-                      target.radius,
-                      nearest_,
-                      is_leaf,
-                      promise_ == Promise::kCertified,
-                      bins_,
-                      lean_.data(),
-                      room.as_point.data(),
-                      room.in_series.data()};
+  const NodeTest test{.nodes = nodes_.data(),
+                      .centre = target.centre,
+                      .radius = target.radius,
+                      .nearest = nearest_,
+                      .open_small = is_leaf,
+                      .certified = promise_ == Promise::kCertified,
+                      .ratio = static_cast<float>(kCertifiedRatio),
+                      .bins = bins_,
+                      .lean = lean_.data(),
+                      .as_point = room.as_point.data(),
+                      .in_series = room.in_series.data()};
   nodes.far.clear();
   nodes.points.clear();
   nodes.samples.clear();

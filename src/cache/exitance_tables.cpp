@@ -127,7 +127,7 @@ void Exitance::make_tables() {
     return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
   };
   const bool certified = promise_ == Promise::kCertified;
-  const double own = certified ? 0 : 0.5 * allowance_;
+  const double own = 0.5 * allowance_;
   const double weight = (certified ? 1 : kSeriesWeight) / 6;
   const OctreeNode& root = group_.nodes[0];
 
@@ -155,7 +155,9 @@ void Exitance::make_tables() {
         if (!(root.power[k] > 0)) continue;
         for (std::size_t i = 0; i < count; ++i) {
           const auto channel = static_cast<int>(k);
-          const double there = std::sqrt(double{edge2(i + 1)}) + radius;
+          // From the middle of the target to the node, or from its far side to the node's.
+          const double near = std::sqrt(double{edge2(i + 1)});
+          const double there = certified ? (1 + 2 * kCertifiedRatio) * near + 2 * radius : near + radius;
           const double value = own * double{kernel_.eval(static_cast<float>(square(there)))[channel]};
           const double series =
               weight * radius * radius * radius * double{kernel_.bounds(edge2(i)).third[channel]};

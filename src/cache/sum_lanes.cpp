@@ -164,14 +164,15 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const VI bin = find_cell(test.bins, hn::Mul(near, near));
     const VF error = hn::MulAdd(node(kNodeLean), hn::GatherIndex(df, test.lean, bin), spread);
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
-    const auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
+    auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
+    if (test.certified) apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
     const auto far = hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.in_series, bin)));
     const auto point =
         hn::AndNot(far, hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.as_point, bin))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
     const VI rim_bin = find_cell(test.bins, hn::Mul(to_rim, to_rim));
-    const auto scattered =
-        hn::And(hn::And(rest, apart), hn::Ge(hn::GatherIndex(df, test.in_series, rim_bin), hn::Zero(df)));
+    const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
+                                   hn::Ge(hn::GatherIndex(df, test.in_series, rim_bin), hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
         test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));

@@ -73,6 +73,7 @@ struct NodeTest {
   float nearest;      // within this distance samples are summed one by one
   bool open_small;    // whether nodes smaller than the target are opened rather than left to its parts
   bool certified;     // whether distances are to the nearest that a sample of the node may be
+  float ratio;        // then: the largest of radius to distance
   DistanceBins bins;  // of the tables below
   const float* lean;  // what the first moment counts
   const float* as_point;

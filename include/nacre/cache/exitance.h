@@ -64,7 +64,10 @@ class Exitance {
   static constexpr double kCellSpacings = 0.75;  // side of the smallest cells
   static constexpr int kBlockLevels = 5;         // a block has 32 of them along each side
   // Cells that are divided no further, for points about as dense as samples.
-  static constexpr int kLeafLevel = 2;
+  static constexpr int kLeafLevel = 1;
+  // Certified, a node is accepted if its radius is at most this share of its distance: all that larger ones
+  // contribute is too uncertain anyway.
+  static constexpr double kCertifiedRatio = 1.0 / 16;
   // Smallest tabulated radius of a target in cells, and steps.
   static constexpr double kSmallestRadius = 0.125;
   static constexpr int kRadiiPerOctave = 4;
