@@ -46,16 +46,19 @@ Scene load_bench_scene(const BenchScene& spec) {
     for (const double degrees : {0.0, kOrbit})
       scene.cameras.push_back(orbit(camera, box.center(), 180 * static_cast<double>(view) + degrees));
   scene.films.assign(scene.cameras.size(), Film(scene.films[0]));
+  scene.integrator.emitter_samples = 1;
   return scene;
 }
 
-Cache bake_samples(const World& world, std::optional<double> points, std::optional<int> irradiance_samples) {
+World make_frame_world(const Scene& scene) { return make_world(scene, false); }
+
+Cache bake_samples(const Scene& scene, std::optional<double> points, std::optional<int> irradiance_samples) {
   BakeParams params;
   params.points = points;
   params.irradiance_samples = irradiance_samples;
   Progress progress;
   Report report;
-  return bake(world, plan_bake(*world.scene, params), params, progress, report);
+  return bake(make_world(scene, params.shadows), plan_bake(scene, params), params, progress, report);
 }
 
 std::size_t sample_count(const Cache& cache) {

@@ -23,9 +23,12 @@ std::vector<BenchScene> bench_scenes();
 
 /// Loads it with the cameras of its views.
 Scene load_bench_scene(const BenchScene& spec);
+/// What frames are rendered in: without shadows on surfaces, which would take most of the time and are not
+/// what is measured.
+World make_frame_world(const Scene& scene);
 
-/// Bakes in memory; `points` as in BakeParams.
-Cache bake_samples(const World& world, std::optional<double> points, std::optional<int> irradiance_samples);
+/// Bakes in memory, with shadows; `points` as in BakeParams.
+Cache bake_samples(const Scene& scene, std::optional<double> points, std::optional<int> irradiance_samples);
 /// Samples of all groups.
 std::size_t sample_count(const Cache& cache);
 

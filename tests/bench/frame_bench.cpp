@@ -71,7 +71,7 @@ BareRow measure_primary_rays(const World& world, std::size_t view, int size, int
 
 void measure_scene(const BenchScene& spec, const Options& options, Results& results) {
   const Scene scene = load_bench_scene(spec);
-  const World world = make_world(scene, true);
+  const World world = make_frame_world(scene);
   const int size = options.quick ? 256 : 1024, runs = options.quick ? 1 : 3;
   const std::optional<int> irradiance_samples = options.quick ? std::optional(8) : std::nullopt;
   const std::size_t views = options.quick ? 1 : spec.views.size();
@@ -85,7 +85,7 @@ void measure_scene(const BenchScene& spec, const Options& options, Results& resu
   const std::vector<Density> densities{{"default", std::nullopt}, {"fixed", 200e3}};
   for (std::size_t d = 0; d < (options.quick ? 1 : densities.size()); ++d) {
     fmt::print(stderr, "{}: baking, {} density\n", spec.title, densities[d].name);
-    const Cache cache = bake_samples(world, densities[d].points, irradiance_samples);
+    const Cache cache = bake_samples(scene, densities[d].points, irradiance_samples);
     for (std::size_t view = 0; view < views; ++view) {
       fmt::print(stderr, "{}, {}: {} samples\n", spec.title, spec.views[view], sample_count(cache));
       const bool certified_frame = spec.name == "bunny50" && !options.quick;
@@ -94,6 +94,8 @@ void measure_scene(const BenchScene& spec, const Options& options, Results& resu
         row.view = spec.views[view];
         row.density = densities[d].name;
         row.samples = sample_count(cache);
+        fmt::print(stderr, "  {}, {}x{}: {:.4f} s / {:.4f} s = {:.3f} {}\n", row.name, row.width, row.height,
+                   row.diffusion_seconds, row.primary_seconds, row.ratio(), row.met());
         results.cases.push_back(std::move(row));
       }
     }
@@ -108,7 +110,10 @@ void run(const Options& options) {
     measure_scene(spec, options, results);
   }
   if (options.only.empty() ? !options.quick : options.only == "growth")
-    measure_growth(options.quick ? 100e3 : options.full ? 10e6 : 1e6, options.quick ? 1 : 3, results);
+    measure_growth(options.quick  ? 100e3
+                   : options.full ? 10e6
+                                  : 1e6,
+                   options.quick ? 1024 : 4096, options.quick ? 1 : 3, results);
   fmt::print("{}", format_markdown(results));
   const std::string json = format_json(results);
   file.write(json.data(), json.size());

@@ -38,22 +38,22 @@ GrowthRow measure(const World& world, const Cache& cache, int size, int runs) {
 
 }  // namespace
 
-void measure_growth(double most_samples, int runs, Results& results) {
+void measure_growth(double most_samples, int most_pixels, int runs, Results& results) {
   const Scene scene = load_bench_scene(bench_scenes().front());
-  const World world = make_world(scene, true);
+  const World world = make_frame_world(scene);
   for (const double samples : {20e3, 100e3, kSamples, 1e6, 10e6}) {
     if (samples > most_samples) break;
     fmt::print(stderr, "growth: {:.0f} samples\n", samples);
     reset_peak_memory();
-    const Cache cache = bake_samples(world, samples, kIrradianceSamples);
+    const Cache cache = bake_samples(scene, samples, kIrradianceSamples);
     const auto bake_peak = static_cast<double>(peak_memory_bytes());
     results.by_samples.push_back(measure(world, cache, kSize, runs));
     results.by_samples.back().bake_peak_bytes = bake_peak;
   }
-  const Cache cache = bake_samples(world, kSamples, kIrradianceSamples);
-  for (const int factor : {1, 2, 4, 8}) {
-    fmt::print(stderr, "growth: {} x {} pixels\n", factor * kSize, factor * kSize);
-    results.by_pixels.push_back(measure(world, cache, factor * kSize, runs));
+  const Cache cache = bake_samples(scene, kSamples, kIrradianceSamples);
+  for (int size = kSize; size <= most_pixels; size *= 2) {
+    fmt::print(stderr, "growth: {} x {} pixels\n", size, size);
+    results.by_pixels.push_back(measure(world, cache, size, runs));
   }
 }
 
