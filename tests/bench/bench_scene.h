@@ -1,0 +1,35 @@
+// The scenes that are measured.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nacre/bake/bake.h"
+#include "nacre/transport/world.h"
+
+namespace nacre::bench {
+
+/// A scene file, its object's size and the views of it. View v has camera 2 v, and camera 2 v + 1 is the same
+/// on an orbit of 10 degrees.
+struct BenchScene {
+  std::string name;   // for --only
+  std::string title;  // in tables
+  std::string file;   // in scenes/
+  std::optional<double> height_mm;
+  std::vector<std::string> views;  // the file's camera, then the opposite one
+};
+std::vector<BenchScene> bench_scenes();
+
+/// Loads it with the cameras of its views.
+Scene load_bench_scene(const BenchScene& spec);
+/// What frames are rendered in: without shadows on surfaces, which would take most of the time and are not
+/// what is measured.
+World make_frame_world(const Scene& scene);
+
+/// Bakes in memory, with shadows; `points` as in BakeParams.
+Cache bake_samples(const Scene& scene, std::optional<double> points, std::optional<int> irradiance_samples);
+/// Samples of all groups.
+std::size_t sample_count(const Cache& cache);
+
+}  // namespace nacre::bench
