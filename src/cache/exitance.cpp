@@ -15,6 +15,9 @@ namespace {
 // its lower bound.
 constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 
+// Largest cells that take over the guess of the cell around them.
+constexpr int kInheritLevel = 1;
+
 // Points per cell above which smaller ones are cheaper.
 constexpr std::size_t kPointsPerCell = 40;
 
@@ -25,6 +28,7 @@ struct Exitance::Target {
   Vec3 centre;
   float radius;        // of a ball around all its points
   LocalExpansion far;  // of what is far from all of it
+  Float4 total;        // about what the sum is
   IndexList pending;   // octree nodes that its parts deal with
 };
 
@@ -99,11 +103,12 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   const bool is_leaf = level == 0 || (room.whole ? level <= kWholeLevel && range.size() <= kPointsPerCell
                                                  : level <= kLeafLevel);
 
-  const Float4 total = weigh(target, room);
+  // The sum hardly changes within a cell of a few samples.
+  target.total = room.whole && level <= kInheritLevel ? parent->total : weigh(target, room);
   Rgb share(0, 0, 0);
   const double factor = 0.5 * allowance_;
   for (int k = 0; k < 3; ++k)
-    if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * total[k] / nodes_[0].power[k];
+    if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * target.total[k] / nodes_[0].power[k];
   const double classes =
       std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
   const Radius& radius =

@@ -166,8 +166,11 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
       const StageClock clock(totals.diffusion);
       std::uint64_t evaluations = 0;
       medium.eval_diffusion(points, radiance, evaluations);
-      add(Layer::kDiffusion);
       totals.evaluations += evaluations;
+    }
+    {
+      const StageClock clock(totals.surface);
+      add(Layer::kDiffusion);
     }
     if (!medium.has_single_scattering()) continue;
     const StageClock clock(totals.single);

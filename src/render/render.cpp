@@ -10,7 +10,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t kPathsPerTask = 1 << 15;
+constexpr std::size_t kPathsPerTask = 1 << 14;
 
 // Rays that are lost in closed objects, too: they met an edge or a vertex to the last bit.
 constexpr double kLostShare = 1e-6;
