@@ -19,7 +19,7 @@ constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 constexpr int kInheritLevel = 1;
 
 // Points per cell above which smaller ones are cheaper.
-constexpr std::size_t kPointsPerCell = 40;
+constexpr std::size_t kPointsPerCell = 48;
 
 }  // namespace
 

@@ -82,6 +82,9 @@ void ExitanceField::fill(std::uint64_t& evaluations) const {
     sum += own;
   });
   evaluations += sum;
+  parallel_for(corners_.size() + patches_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) judge(static_cast<std::uint32_t>(i));
+  });
 }
 
 KeptExitance ExitanceField::keep() const {
@@ -114,6 +117,11 @@ std::size_t ExitanceField::filled_node_count() const {
     if (block_state_[block].load(std::memory_order_acquire) == kFull)
       count += block_begin_[block + 1] - block_begin_[block];
   return count;
+}
+
+// Once its nodes are known, whether a patch may be interpolated.
+void ExitanceField::judge(std::uint32_t index) const noexcept {
+  patch_state_[index].store(is_steep(patch(index)) ? kSteep : kSmooth, std::memory_order_release);
 }
 
 bool ExitanceField::is_steep(const Patch& patch) const noexcept {
@@ -166,8 +174,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     std::sort(blocks.begin(), blocks.end());
     blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     await_blocks(blocks, evaluations);
-    for (const std::uint32_t index : missing)
-      patch_state_[index].store(is_steep(patch(index)) ? kSteep : kSmooth, std::memory_order_release);
+    for (const std::uint32_t index : missing) judge(index);
   }
   std::vector<std::uint32_t> steep;
   for (std::uint32_t i = 0; i < hits.size(); ++i) {
