@@ -158,12 +158,18 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     std::uint32_t patch;
     float u, v;
   };
+  // What a value is made of lies all over the memory: a few hits together fetch it while others are at work.
+  constexpr std::size_t kTogether = 32;
   std::vector<Place> places(hits.size());
   std::vector<std::uint32_t> missing, blocks;
   for (std::size_t i = 0; i < hits.size(); ++i) {
+    const Hit& ahead = hits[std::min(i + kTogether, hits.size() - 1)];
+    __builtin_prefetch(&parts_[first_triangle_[ahead.mesh] + ahead.triangle]);
     places[i].patch = find_patch(hits[i], places[i].u, places[i].v);
-    if (!patch_state_[places[i].patch].load(std::memory_order_acquire)) missing.push_back(places[i].patch);
+    __builtin_prefetch(&patch_state_[places[i].patch]);
   }
+  for (const Place& place : places)
+    if (!patch_state_[place.patch].load(std::memory_order_acquire)) missing.push_back(place.patch);
   if (!missing.empty()) {
     std::sort(missing.begin(), missing.end());
     missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
@@ -177,11 +183,20 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     for (const std::uint32_t index : missing) judge(index);
   }
   std::vector<std::uint32_t> steep;
-  for (std::uint32_t i = 0; i < hits.size(); ++i) {
-    if (patch_state_[places[i].patch].load(std::memory_order_acquire) == kSteep)
-      steep.push_back(i);
-    else
-      exitance[i] = interpolate(patch(places[i].patch), places[i].u, places[i].v);
+  std::array<Patch, kTogether> fetched;
+  for (std::size_t begin = 0; begin < hits.size(); begin += kTogether) {
+    const std::size_t count = std::min(kTogether, hits.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      fetched[i] = patch(places[begin + i].patch);
+      for (const std::uint32_t node : fetched[i].nodes)
+        if (node != kNone) __builtin_prefetch(&values_[node]);
+    }
+    for (std::size_t i = begin; i < begin + count; ++i) {
+      if (patch_state_[places[i].patch].load(std::memory_order_acquire) == kSteep)
+        steep.push_back(static_cast<std::uint32_t>(i));
+      else
+        exitance[i] = interpolate(fetched[i - begin], places[i].u, places[i].v);
+    }
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;

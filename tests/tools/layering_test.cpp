@@ -36,7 +36,7 @@ const std::vector<Library> kLibraries{
     {"zlib.h", {"src/geometry/serialized_file.cpp"}},
     {"xxhash", {"src/cache/"}},
     {"flann/", {"src/bake/"}},
-    {"hwy/", {"src/"}},
+    {"hwy/", {"src/base/simd.cpp", "src/cache/sum_lanes.cpp"}},
     {"Imf", {"src/render/", "src/scene/bitmap_exr.cpp"}},
     {"Iex", {"src/render/"}},
     {"IlmThread", {"src/render/"}},
@@ -45,7 +45,7 @@ const std::vector<Library> kLibraries{
     {"stb", {"src/render/", "src/scene/bitmap.cpp"}},
     {"CLI/", {"tools/"}},
 };
-const std::vector<std::string> kSystemHeaders{"sys/", "fcntl.h", "unistd.h", "signal.h", "dirent.h"};
+const std::vector<std::string> kSystemHeaders{"sys/", "fcntl.h", "unistd.h", "signal.h", "dirent.h", "malloc.h"};
 
 constexpr std::size_t kMaxLines = 400;
 
