@@ -137,23 +137,27 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels)
 // The points of one medium together, so that those near each other share their work.
 void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels,
                                  Totals& totals) const {
-  std::vector<const Path*> hits;
+  std::vector<const Path*> owners;
+  std::vector<Hit> hits;
   std::vector<ExitPoint> points;
   std::vector<Rgb> radiance;
   for (std::size_t m = 0; m < media_.size(); ++m) {
     const Translucency& medium = media_[m];
+    owners.clear();
     hits.clear();
     points.clear();
     const auto add = [&](Layer layer) {
-      for (std::size_t i = 0; i < hits.size(); ++i)
-        pixels.add(wave == 0 ? layer : hits[i]->layer, hits[i]->pixel, hits[i]->throughput * radiance[i]);
+      for (std::size_t i = 0; i < owners.size(); ++i)
+        pixels.add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
+                   owners[i]->throughput * radiance[i]);
     };
     {
       const StageClock clock(totals.surface);
       for (const Path& path : paths) {
         if (!path.hit || path.depth >= depth_limit_ || world_.shape(path.hit).medium != static_cast<int>(m))
           continue;
-        hits.push_back(&path);
+        owners.push_back(&path);
+        hits.push_back(path.hit);
         points.push_back(
             {path.hit, surface_point(world_, path.hit), -path.ray.ray.direction,
              pixel_key(path.pixel, 200 + hash_words(static_cast<std::uint64_t>(wave), path.branch)),
@@ -165,11 +169,12 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
     {
       const StageClock clock(totals.diffusion);
       std::uint64_t evaluations = 0;
-      medium.eval_diffusion(points, radiance, evaluations);
+      medium.eval_diffusion(hits, points, radiance, evaluations);
       totals.evaluations += evaluations;
     }
     {
       const StageClock clock(totals.surface);
+      for (std::size_t i = 0; i < points.size(); ++i) radiance[i] *= medium.exit_weight(points[i]);
       add(Layer::kDiffusion);
     }
     if (!medium.has_single_scattering()) continue;

@@ -99,36 +99,33 @@ KeptExitance Translucency::keep() const {
   return kept;
 }
 
-void Translucency::eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
-                                  std::uint64_t& evaluations) const {
-  if (field_) {
-    std::vector<Hit> hits;
-    hits.reserve(points.size());
-    for (const ExitPoint& point : points) hits.push_back(point.hit);
-    field_->eval(hits, radiance, evaluations);
-  } else if (exitance_) {
+void Translucency::eval_diffusion(std::span<const Hit> hits, std::span<const ExitPoint> points,
+                                  std::span<Rgb> exitance, std::uint64_t& evaluations) const {
+  if (field_) return field_->eval(hits, exitance, evaluations);
+  if (exitance_) {
     std::vector<Vec3> positions;
     positions.reserve(points.size());
     for (const ExitPoint& point : points) positions.push_back(point.surface.position);
     if (method_ == Method::kExact)
-      exitance_->eval_exact(positions, radiance, evaluations);
+      exitance_->eval_exact(positions, exitance, evaluations);
     else
-      exitance_->eval(positions, radiance, evaluations);
-  } else {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const ExitPoint& point = points[i];
-      if (monte_carlo_) {
-        radiance[i] =
-            monte_carlo_->estimate(point.surface, mc_samples_, hash_words(point.key, kMonteCarloPoints),
-                                   point.sample * static_cast<std::uint32_t>(mc_samples_));
-        evaluations += static_cast<std::uint64_t>(mc_samples_);
-      } else {
-        radiance[i] = lambert_exitance(point);
-      }
-    }
+      exitance_->eval(positions, exitance, evaluations);
+    return;
   }
-  for (std::size_t i = 0; i < points.size(); ++i)
-    radiance[i] *= exit_transmittance(world_, points[i].hit, points[i].surface, points[i].out) * exit_factor_;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ExitPoint& point = points[i];
+    if (!monte_carlo_) {
+      exitance[i] = lambert_exitance(point);
+      continue;
+    }
+    exitance[i] = monte_carlo_->estimate(point.surface, mc_samples_, hash_words(point.key, kMonteCarloPoints),
+                                         point.sample * static_cast<std::uint32_t>(mc_samples_));
+    evaluations += static_cast<std::uint64_t>(mc_samples_);
+  }
+}
+
+Rgb Translucency::exit_weight(const ExitPoint& point) const {
+  return exit_transmittance(world_, point.hit, point.surface, point.out) * exit_factor_;
 }
 
 void Translucency::eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance,

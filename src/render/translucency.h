@@ -30,10 +30,12 @@ class Translucency {
   /// `group` is read where the method needs it, else it may be nullptr.
   Translucency(const World& world, std::size_t medium, const CacheGroup* group, const RenderParams& params);
 
-  /// Radiance that leaves by diffusion, for points that should lie near each other. Adds to `evaluations`
-  /// those of the profile.
-  void eval_diffusion(std::span<const ExitPoint> points, std::span<Rgb> radiance,
+  /// Diffuse exitance M_o at points that should lie near each other; `hits` are theirs, side by side. Adds to
+  /// `evaluations` those of the profile.
+  void eval_diffusion(std::span<const Hit> hits, std::span<const ExitPoint> points, std::span<Rgb> exitance,
                       std::uint64_t& evaluations) const;
+  /// From exitance to the radiance that leaves towards the eye.
+  Rgb exit_weight(const ExitPoint& point) const;
   /// Evaluates diffusion on the whole surface, where it is kept.
   void fill(std::uint64_t& evaluations) const {
     if (field_) field_->fill(evaluations);
