@@ -45,7 +45,8 @@ const std::vector<Library> kLibraries{
     {"stb", {"src/render/", "src/scene/bitmap.cpp"}},
     {"CLI/", {"tools/"}},
 };
-const std::vector<std::string> kSystemHeaders{"sys/", "fcntl.h", "unistd.h", "signal.h", "dirent.h", "malloc.h"};
+const std::vector<std::string> kSystemHeaders{"sys/",     "fcntl.h",  "unistd.h",
+                                              "signal.h", "dirent.h", "malloc.h"};
 
 constexpr std::size_t kMaxLines = 400;
 

@@ -75,7 +75,7 @@ class ExitanceField {
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
-  std::vector<std::uint32_t> first_triangle_;          // by mesh, and the end
+  std::vector<std::uint32_t> first_triangle_;          // by mesh
   std::vector<std::array<std::uint32_t, 3>> corners_;  // of triangles, as nodes
   std::vector<std::uint32_t> parts_;  // by triangle, then parts of splits: a patch or kSplitBit and a split
   std::vector<Patch> patches_;        // their numbers follow those of the triangles that are whole patches

@@ -17,9 +17,9 @@ struct DistanceBins {
   std::int32_t first, last, shift;
 };
 
-/// A kernel's tables as the vector code reads them. Interpolated: cells of 8 floats (R of three channels and a
-/// spare, their differences to the next cell), and of 16 (R'/r, differences, (R'' - R'/r)/r^2, differences).
-/// Else: cells of 4 and of 8, the same without the differences, in the middle of each cell.
+/// A kernel's tables as the vector code reads them. Interpolated: cells of 8 floats (R of three channels and
+/// a spare, their differences to the next cell), and of 16 (R'/r, differences, (R'' - R'/r)/r^2,
+/// differences). Else: cells of 4 and of 8, the same without the differences, in the middle of each cell.
 struct KernelTables {
   const float *cells, *jets;
   bool interpolated;
@@ -77,7 +77,7 @@ class Kernel {
     Float4 hessian, slope, third;
   };
   const Bounds& bounds(float r2) const noexcept { return bounds_[bound_index(r2)]; }
-  /// The cells of `bounds`, and the distance at which one begins.
+  /// The cells of `bounds`.
   DistanceBins bound_bins() const noexcept {
     return {static_cast<std::int32_t>(first_bound_),
             static_cast<std::int32_t>(first_bound_ + bounds_.size() - 1), 23 - kBoundBits};
