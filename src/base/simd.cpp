@@ -31,8 +31,10 @@ std::vector<std::int64_t> targets() {
 
 std::vector<std::string> simd_targets() {
   std::vector<std::string> names;
+  const std::int64_t chosen = hwy::SupportedTargets();
   hwy::SetSupportedTargetsForTest(0);  // what the processor has, whatever was chosen
   for (const std::int64_t target : targets()) names.push_back(name_of(target));
+  if (chosen != hwy::SupportedTargets()) hwy::SetSupportedTargetsForTest(chosen);  // asking changes nothing
   return names;
 }
 

@@ -24,6 +24,10 @@ TEST(Simd, ScalarIsAlwaysThereAndOthersAreRefused) {
   EXPECT_EQ(simd_targets().back(), "scalar");
   EXPECT_FALSE(choose_simd_target("mmx"));
   EXPECT_EQ(simd_target(), simd_targets().front());
+  EXPECT_TRUE(choose_simd_target("scalar"));
+  EXPECT_GT(simd_targets().size(), 0u);  // to ask what there is leaves the choice as it was
+  EXPECT_EQ(simd_target(), "scalar");
+  EXPECT_TRUE(choose_simd_target(simd_targets().front()));
 }
 
 std::vector<SumSource> make_sources(std::size_t count) {
