@@ -39,7 +39,7 @@ struct Exitance::Room {
   std::array<Target, kBlockLevels + 1> targets;
   SortedNodes nodes;
   SourceList list;
-  std::vector<float> as_point, in_series;  // limits of the target at hand
+  std::vector<float> limits;  // of the target at hand
   std::uint64_t evaluations = 0;
 };
 
@@ -78,7 +78,7 @@ Float4 Exitance::weigh(const Target& target, Room& room) const {
     room.evaluations += lanes::add_coarsely(kernel_.tables(), test, room.nodes, total);
     room.nodes.work.clear();
     for (const std::uint32_t index : room.nodes.opened.span())
-      room.nodes.work.push_run(nodes_[index].first_child, nodes_[index].child_count());
+      room.nodes.work.push_run(nodes_[index].first, nodes_[index].child_count());
   }
   return total;
 }
@@ -113,15 +113,14 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
   const Radius& radius =
       radii_[static_cast<std::size_t>(std::clamp(classes, 0.0, static_cast<double>(radii_.size() - 1)))];
-  const std::array<const float*, 3> per_bend{per_bend_[0].data(), per_bend_[1].data(), per_bend_[2].data()};
-  const auto limits = [&](const std::array<std::vector<float>, 3>& channels, std::vector<float>& out) {
-    out.resize(lean_.size());
-    lanes::least_of_channels({channels[0].data(), channels[1].data(), channels[2].data()}, per_bend, share,
-                             out.size(), out.data());
-    out[0] = -1;
+  const auto data = [](const std::array<std::vector<float>, 3>& channels) {
+    return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
   };
-  limits(radius.as_point, room.as_point);
-  limits(radius.in_series, room.in_series);
+  room.limits.resize(kLimitCount * lean_.size());
+  lanes::make_limits({lean_.data(), data(radius.as_point), data(radius.in_series), data(per_bend_)}, share,
+                     lean_.size(), room.limits.data());
+  // All that is nearer than the bins reach.
+  room.limits[kAsPoint] = room.limits[kInSeries] = -1;
 
   SortedNodes& nodes = room.nodes;
   const NodeTest test{.nodes = nodes_.data(),
@@ -132,9 +131,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
                       .certified = promise_ == Promise::kCertified,
                       .ratio = static_cast<float>(kCertifiedRatio),
                       .bins = bins_,
-                      .lean = lean_.data(),
-                      .as_point = room.as_point.data(),
-                      .in_series = room.in_series.data()};
+                      .limits = room.limits.data()};
   nodes.far.clear();
   nodes.points.clear();
   nodes.samples.clear();
@@ -153,16 +150,16 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     nodes.work.clear();
     for (const std::uint32_t index : nodes.scattered.span()) {
       const SumNode& node = nodes_[index];
-      for (std::uint32_t c = 0; c < node.child_count(); ++c) nodes.work.push(node.first_child + c);
-      if (node.child_count() == 0)
-        for (std::uint32_t i = 0; i < node.sample_count(); ++i) nodes.far_samples.push(node.first_sample + i);
+      const bool has_children = node.child_count() > 0;
+      (has_children ? nodes.work : nodes.far_samples)
+          .push_run(node.first, has_children ? node.child_count() : node.sample_count());
     }
     for (const std::uint32_t index : nodes.opened.span()) {
       const SumNode& node = nodes_[index];
       if (node.child_count() > 0)
-        nodes.work.push_run(node.first_child, node.child_count());
+        nodes.work.push_run(node.first, node.child_count());
       else if (is_leaf)
-        nodes.samples.push_run(node.first_sample, node.sample_count());
+        nodes.samples.push_run(node.first, node.sample_count());
       else
         target.pending.push(index);
     }
@@ -176,8 +173,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
       const SumNode& node = nodes_[index];
-      const SumSource source{node.x, node.y, node.z, 0,
-                             Float4{node.power[0], node.power[1], node.power[2], 0}};
+      const SumSource source{node.x, node.y, node.z, 0, node.power};
       room.list.add({&source, 1});
     }
     room.list.pad();
@@ -217,7 +213,7 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
   });
-  Room room{points, exitance, whole, {}, {}, {}, {}, {}, 0};
+  Room room{points, exitance, whole, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)

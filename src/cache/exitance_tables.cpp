@@ -88,11 +88,9 @@ void Exitance::make_nodes() {
               from.radius,
               -1,
               0,
-              from.child_count() > 0 ? from.radius : 0.0f,
-              {from.power[0], from.power[1], from.power[2]},
-              from.first_child,
+              from.child_count() > 0 ? from.first_child : from.first_sample,
               from.packed_counts,
-              from.first_sample};
+              Float4{from.power[0], from.power[1], from.power[2], 0}};
       for (int k = 0; k < 3; ++k)
         if (from.power[k] > 0) {
           // Rounded up by more than division and the bounds' product lose.

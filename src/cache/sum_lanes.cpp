@@ -19,6 +19,18 @@ using U = hn::RebindToUnsigned<F>;
 using VF = hn::Vec<F>;
 using VI = hn::Vec<I>;
 
+HWY_INLINE Float4 mul_add(Float4 a, Float4 b, Float4 c) {
+#if HWY_TARGET == HWY_SCALAR
+  return a * b + c;
+#else
+  const hn::FixedTag<float, 4> d;
+  const auto load = [&](const Float4& x) HWY_ATTR { return hn::Load(d, reinterpret_cast<const float*>(&x)); };
+  Float4 sum;
+  hn::Store(hn::MulAdd(load(a), load(b), load(c)), d, reinterpret_cast<float*>(&sum));
+  return sum;
+#endif
+}
+
 // Where a distance lies in a table: the cell times `stride`, and the fraction of it.
 HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
   const I di;
@@ -34,24 +46,24 @@ HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
                  hn::Set(df, 1.0f / static_cast<float>(1 << bins.shift)));
 }
 
-// Rows of a table at squared distances: fields of a row are 4 floats, one for each channel, followed by their
-// differences to the next row if the table is interpolated.
-template <bool kInterpolated, int kFieldsLog2>
+// Rows of a table for a run of squared distances. A row has fields of three channels, each followed by its
+// difference to the next row if the table is interpolated. Rows are read one by one: a gather takes as long
+// for one float of each.
+template <bool kInterpolated, int kFields, std::size_t kRun>
 struct Rows {
-  const float* table;
-  VI offset;
-  VF fraction;
+  const Float4* table;
+  HWY_ALIGN std::int32_t row[kRun];
+  HWY_ALIGN float fraction[kInterpolated ? kRun : 1];
 
-  HWY_INLINE Rows(const float* first, const DistanceBins& bins, VF r2)
-      : table(first), offset(hn::ShiftLeft<2 + kFieldsLog2 + kInterpolated>(find_cell(bins, r2))) {
-    if constexpr (kInterpolated) fraction = find_fraction(bins, r2);
+  HWY_INLINE Rows(const float* first) : table(reinterpret_cast<const Float4*>(first)) {}
+  HWY_INLINE void find(std::size_t i, const DistanceBins& bins, VF r2) {
+    hn::Store(find_cell(bins, r2), I(), row + i);
+    if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
   }
-  HWY_INLINE VF operator()(int field, int channel) const {
-    const F df;
-    const float* const at = table + (kInterpolated ? 8 : 4) * field + channel;
-    const VF value = hn::GatherIndex(df, at, offset);
-    if constexpr (kInterpolated) return hn::MulAdd(fraction, hn::GatherIndex(df, at + 4, offset), value);
-    return value;
+  HWY_INLINE Float4 operator()(std::size_t i, int field) const {
+    const Float4* const at = table + (kInterpolated ? 2 : 1) * (kFields * row[i] + field);
+    if constexpr (kInterpolated) return mul_add(broadcast(fraction[i]), at[1], at[0]);
+    return at[0];
   }
 };
 
@@ -80,25 +92,28 @@ template <bool kInterpolated>
 HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, const Vec3& x,
                          std::array<double, 3>& total) {
   const F df;
-  // Runs of a few terms are kept by floats; the whole is added up in double precision.
-  constexpr std::size_t kRun = 64;
-  const std::size_t lanes = hn::Lanes(df), count = (list.size() + lanes - 1) / lanes * lanes;
+  // Runs of few terms are added up by floats, those in double precision.
+  constexpr std::size_t kRun = 256, kSums = 4;
+  const std::size_t lanes = hn::Lanes(df), step = std::max(lanes, kSums),
+                    count = (list.size() + step - 1) / step * step;
   const VF cx = hn::Set(df, x.x), cy = hn::Set(df, x.y), cz = hn::Set(df, x.z);
-  for (std::size_t begin = 0; begin < count; begin += kRun * lanes) {
-    VF r = hn::Zero(df), g = r, b = r;
-    for (std::size_t i = begin, end = std::min(count, begin + kRun * lanes); i < end; i += lanes) {
-      const auto load = [&](SourceList::Field f) HWY_ATTR { return hn::LoadU(df, list.field(f) + i); };
+  Rows<kInterpolated, 1, kRun> rows(kernel.cells);
+  for (std::size_t begin = 0; begin < count; begin += kRun) {
+    const std::size_t size = std::min(kRun, count - begin);
+    for (std::size_t i = 0; i < size; i += lanes) {
+      const auto load = [&](SourceList::Field f)
+                            HWY_ATTR { return hn::LoadU(df, list.field(f) + begin + i); };
       VF r2 = length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
                       hn::Sub(load(SourceList::kZ), cz));
       if (kernel.singular) r2 = disc_distance2(kernel, r2, load(SourceList::kArea));
-      const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
-      r = hn::MulAdd(row(0, 0), load(SourceList::kR), r);
-      g = hn::MulAdd(row(0, 1), load(SourceList::kG), g);
-      b = hn::MulAdd(row(0, 2), load(SourceList::kB), b);
+      rows.find(i, kernel.cell_bins, r2);
     }
-    total[0] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, r)));
-    total[1] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, g)));
-    total[2] += static_cast<double>(hn::GetLane(hn::SumOfLanes(df, b)));
+    Float4 sums[kSums] = {};
+    const Float4* const power = list.powers() + begin;
+    for (std::size_t i = 0; i < size; i += kSums)
+      for (std::size_t k = 0; k < kSums; ++k) sums[k] = mul_add(power[i + k], rows(i + k, 0), sums[k]);
+    const Float4 sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    for (std::size_t k = 0; k < 3; ++k) total[k] += static_cast<double>(sum[static_cast<int>(k)]);
   }
 }
 
@@ -139,7 +154,17 @@ HWY_INLINE Fields gather(const Struct* structs, hn::Vec<U> index) {
                   hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
 }
 // The fields of a SumNode, float by float.
-enum NodeField { kNodeX, kNodeY, kNodeZ, kNodeRadius, kNodeSpread, kNodeLean, kNodeOpening, kNodePower };
+enum NodeField {
+  kNodeX,
+  kNodeY,
+  kNodeZ,
+  kNodeRadius,
+  kNodeSpread,
+  kNodeLean,
+  kNodeFirst,
+  kNodeCounts,
+  kNodePower
+};
 // And of a SumSource.
 enum SourceField { kSourceX, kSourceY, kSourceZ, kSourceArea, kSourcePower };
 
@@ -162,17 +187,19 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const VF to_rim = hn::Sub(to_centre, radius);
     const VF near = test.certified ? to_rim : to_centre;
     const VI bin = find_cell(test.bins, hn::Mul(near, near));
-    const VF error = hn::MulAdd(node(kNodeLean), hn::GatherIndex(df, test.lean, bin), spread);
+    const VI row = hn::ShiftLeft<2>(bin);
+    const auto limit = [&](Limit which, VI at)
+                           HWY_ATTR { return hn::GatherIndex(df, test.limits + which, at); };
+    const VF error = hn::MulAdd(node(kNodeLean), limit(kLean, row), spread);
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
     auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
     if (test.certified) apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
-    const auto far = hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.in_series, bin)));
-    const auto point =
-        hn::AndNot(far, hn::And(apart, hn::Le(error, hn::GatherIndex(df, test.as_point, bin))));
+    const auto far = hn::And(apart, hn::Le(error, limit(kInSeries, row)));
+    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(error, limit(kAsPoint, row))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
-    const VI rim_bin = find_cell(test.bins, hn::Mul(to_rim, to_rim));
+    const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
     const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
-                                   hn::Ge(hn::GatherIndex(df, test.in_series, rim_bin), hn::Zero(df)));
+                                   hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
         test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
@@ -196,81 +223,91 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
     const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
-    const auto far = hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
-                             hn::Ge(hn::GatherIndex(df, test.in_series, bin), hn::Zero(df)));
+    const auto far =
+        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
+                hn::Ge(hn::GatherIndex(df, test.limits + kInSeries, hn::ShiftLeft<2>(bin)), hn::Zero(df)));
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
     near.reserve(lanes);
     const auto here = hn::AndNot(far, batch.valid);
-    const VF values[] = {x,
-                         y,
-                         z,
-                         source(kSourceArea),
-                         source(kSourcePower),
-                         source(kSourcePower + 1),
-                         source(kSourcePower + 2)};
+    const VF values[] = {x, y, z, source(kSourceArea)};
     for (int f = 0; f < SourceList::kFieldCount; ++f)
-      hn::CompressStore(values[f], here, df, near.end(static_cast<SourceList::Field>(f)));
-    near.grow(hn::CountTrue(df, here));
+      hn::CompressStore(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
+    HWY_ALIGN std::uint32_t which[hn::MaxLanes(df)];
+    const std::size_t taken = hn::CompressStore(batch.index, hn::RebindMask(U(), here), U(), which);
+    for (std::size_t k = 0; k < taken; ++k) near.powers()[near.size() + k] = sources[which[k]].power;
+    near.grow(taken);
   }
 }
 
-template <bool kInterpolated, int kPower, class Struct>
+template <bool kInterpolated, class Struct>
 HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
                             std::span<const std::uint32_t> far, const Vec3& centre,
                             LocalExpansion& expansion) {
   const F df;
-  const std::size_t lanes = hn::Lanes(df);
-  const VF cx = hn::Set(df, centre.x), cy = hn::Set(df, centre.y), cz = hn::Set(df, centre.z);
-  VF sums[3][10];
-  for (auto& channel : sums)
-    for (VF& sum : channel) sum = hn::Zero(df);
-  for (std::size_t i = 0; i < far.size(); i += lanes) {
-    const Batch batch = load_batch(far.data(), i, far.size());
-    const Fields source = gather(structs, batch.index);
-    const VF x = hn::Sub(cx, source(0)), y = hn::Sub(cy, source(1)), z = hn::Sub(cz, source(2));
-    const VF r2 = length2(x, y, z);
-    const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
-    const Rows<kInterpolated, 1> jet(kernel.jets, kernel.jet_bins, r2);
-    for (int k = 0; k < 3; ++k) {
-      const VF power = hn::IfThenElseZero(batch.valid, source(kPower + k));
-      const VF value = row(0, k);
-      const VF radial = hn::Mul(power, jet(0, k));
-      const VF bend = hn::Mul(power, jet(1, k));
-      VF(&s)[10] = sums[k];
-      s[0] = hn::MulAdd(power, value, s[0]);
-      s[1] = hn::MulAdd(radial, x, s[1]);
-      s[2] = hn::MulAdd(radial, y, s[2]);
-      s[3] = hn::MulAdd(radial, z, s[3]);
-      const VF bend_x = hn::Mul(bend, x), bend_y = hn::Mul(bend, y), bend_z = hn::Mul(bend, z);
-      s[4] = hn::Add(hn::MulAdd(bend_x, x, radial), s[4]);
-      s[5] = hn::Add(hn::MulAdd(bend_y, y, radial), s[5]);
-      s[6] = hn::Add(hn::MulAdd(bend_z, z, radial), s[6]);
-      s[7] = hn::MulAdd(bend_y, z, s[7]);
-      s[8] = hn::MulAdd(bend_z, x, s[8]);
-      s[9] = hn::MulAdd(bend_x, y, s[9]);
+  constexpr std::size_t kRun = 128;
+  const Float4 middle{centre.x, centre.y, centre.z, 0};
+  HWY_ALIGN Float4 offsets[kRun];
+  Rows<kInterpolated, 1, kRun> values(kernel.cells);
+  Rows<kInterpolated, 2, kRun> jets(kernel.jets);
+  for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
+    const std::size_t size = std::min(kRun, far.size() - begin), lanes = hn::Lanes(df);
+    for (std::size_t i = 0; i < size; ++i) {
+      const Struct& s = structs[far[begin + i]];
+      offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
     }
-  }
-  for (int k = 0; k < 3; ++k) {
-    const auto sum = [&](int i) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(df, sums[k][i])); };
-    expansion.value[k] += sum(0);
-    for (int i = 0; i < 3; ++i) expansion.gradient[static_cast<std::size_t>(i)][k] += sum(1 + i);
-    for (int i = 0; i < 6; ++i) expansion.hessian[static_cast<std::size_t>(i)][k] += sum(4 + i);
+    for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
+    for (std::size_t i = 0; i < size; i += lanes) {
+      VF x, y, z, rest;
+      hn::LoadInterleaved4(df, reinterpret_cast<const float*>(offsets + i), x, y, z, rest);
+      const VF r2 = length2(x, y, z);
+      values.find(i, kernel.cell_bins, r2);
+      jets.find(i, kernel.jet_bins, r2);
+    }
+    // Each sum in a register of its own.
+    Float4 value{}, trace{}, slope_x{}, slope_y{}, slope_z{}, xx{}, yy{}, zz{}, yz{}, zx{}, xy{};
+    for (std::size_t i = 0; i < size; ++i) {
+      const Float4 power = structs[far[begin + i]].power;
+      const Float4 x = broadcast(offsets[i][0]), y = broadcast(offsets[i][1]), z = broadcast(offsets[i][2]);
+      value = mul_add(power, values(i, 0), value);
+      const Float4 radial = power * jets(i, 0), bend = power * jets(i, 1);
+      trace += radial;
+      slope_x = mul_add(radial, x, slope_x);
+      slope_y = mul_add(radial, y, slope_y);
+      slope_z = mul_add(radial, z, slope_z);
+      const Float4 bend_x = bend * x, bend_y = bend * y, bend_z = bend * z;
+      xx = mul_add(bend_x, x, xx);
+      yy = mul_add(bend_y, y, yy);
+      zz = mul_add(bend_z, z, zz);
+      yz = mul_add(bend_y, z, yz);
+      zx = mul_add(bend_z, x, zx);
+      xy = mul_add(bend_x, y, xy);
+    }
+    expansion.value += value;
+    expansion.gradient[0] += slope_x;
+    expansion.gradient[1] += slope_y;
+    expansion.gradient[2] += slope_z;
+    expansion.hessian[0] += xx + trace;
+    expansion.hessian[1] += yy + trace;
+    expansion.hessian[2] += zz + trace;
+    expansion.hessian[3] += yz;
+    expansion.hessian[4] += zx;
+    expansion.hessian[5] += xy;
   }
 }
 
 void add_node_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                      const Vec3& centre, LocalExpansion& expansion) {
   if (kernel.interpolated)
-    add_structs<true, kNodePower>(kernel, nodes, far, centre, expansion);
+    add_structs<true>(kernel, nodes, far, centre, expansion);
   else
-    add_structs<false, kNodePower>(kernel, nodes, far, centre, expansion);
+    add_structs<false>(kernel, nodes, far, centre, expansion);
 }
 void add_sample_series(const KernelTables& kernel, const SumSource* sources,
                        std::span<const std::uint32_t> far, const Vec3& centre, LocalExpansion& expansion) {
   if (kernel.interpolated)
-    add_structs<true, kSourcePower>(kernel, sources, far, centre, expansion);
+    add_structs<true>(kernel, sources, far, centre, expansion);
   else
-    add_structs<false, kSourcePower>(kernel, sources, far, centre, expansion);
+    add_structs<false>(kernel, sources, far, centre, expansion);
 }
 
 template <bool kInterpolated>
@@ -287,16 +324,24 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest&
     const VF radius = node(kNodeRadius);
     const VF r =
         hn::Sqrt(length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz)));
-    const auto open = hn::And(batch.valid, hn::Gt(node(kNodeOpening), hn::Mul(hn::Set(df, test.ratio), r)));
+    const auto has_children = hn::RebindMask(
+        df, hn::Ne(hn::ShiftRight<SumNode::kChildShift>(hn::BitCast(U(), node(kNodeCounts))), hn::Zero(U())));
+    const auto open =
+        hn::And(hn::And(batch.valid, has_children), hn::Gt(radius, hn::Mul(hn::Set(df, test.ratio), r)));
     append(lists.opened, lists.opened.room(lanes), batch.index, open);
     const auto taken = hn::AndNot(open, batch.valid);
     added += hn::CountTrue(df, taken);
     const VF distance = test.certified ? hn::Add(hn::Add(r, radius), hn::Set(df, test.slack))
                                        : hn::Max(hn::Max(r, radius), hn::Set(df, test.slack));
     const VF r2 = hn::Mul(distance, distance);
-    const Rows<kInterpolated, 0> row(kernel.cells, kernel.cell_bins, r2);
-    for (int k = 0; k < 3; ++k)
-      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, node(kNodePower + k)), row(0, k), sums[k]);
+    const VI row = hn::ShiftLeft<2 + kInterpolated>(find_cell(kernel.cell_bins, r2));
+    for (int k = 0; k < 3; ++k) {
+      VF value = hn::GatherIndex(df, kernel.cells + k, row);
+      if constexpr (kInterpolated)
+        value = hn::MulAdd(find_fraction(kernel.cell_bins, r2),
+                           hn::GatherIndex(df, kernel.cells + 4 + k, row), value);
+      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, node(kNodePower + k)), value, sums[k]);
+    }
   }
   for (int k = 0; k < 3; ++k) total[k] += hn::GetLane(hn::SumOfLanes(df, sums[k]));
   return added;
@@ -308,15 +353,18 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
                              : add_nodes<false>(kernel, test, lists, total);
 }
 
-void least_of_channels(const std::array<const float*, 3>& a, const std::array<const float*, 3>& b,
-                       const Rgb& share, std::size_t count, float* out) {
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
   const F df;
   for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
-    VF least = hn::Set(df, 3e38f);
-    for (std::size_t k = 0; k < 3; ++k)
-      least = hn::Min(least, hn::MulAdd(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, b[k] + i),
-                                        hn::LoadU(df, a[k] + i)));
-    hn::StoreU(least, df, out + i);
+    VF point = hn::Set(df, 3e38f), series = point;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const VF allowed =
+          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_bend[k] + i));
+      point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, tables.as_point[k] + i)));
+      series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
+    }
+    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), point, series, hn::Zero(df), df,
+                          limits + kLimitCount * i);
   }
 }
 
@@ -330,24 +378,28 @@ namespace nacre {
 constexpr std::size_t kLongest = 64;
 
 void SourceList::reserve(std::size_t count) {
-  if (fields_[0].size() < size_ + count + kLongest)
-    for (auto& field : fields_) field.resize(2 * (size_ + count + kLongest));
+  if (powers_.size() >= size_ + count + kLongest) return;
+  for (auto& field : fields_) field.resize(2 * (size_ + count + kLongest));
+  powers_.resize(2 * (size_ + count + kLongest));
 }
 
 void SourceList::add(std::span<const SumSource> sources) {
   reserve(sources.size());
   for (const SumSource& s : sources) {
-    const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area, s.power[0], s.power[1], s.power[2]};
+    const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area};
     for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
+    powers_[size_] = s.power;
     ++size_;
   }
 }
 
 void SourceList::pad() {
   if (size_ == 0) return;
-  for (std::size_t i = 0; i < kLongest; ++i)
-    for (std::size_t f = 0; f < kFieldCount; ++f)
-      fields_[f][size_ + i] = f < kR ? fields_[f][size_ - 1] : 0.0f;
+  reserve(0);
+  for (std::size_t i = 0; i < kLongest; ++i) {
+    for (auto& field : fields_) field[size_ + i] = field[size_ - 1];
+    powers_[size_ + i] = broadcast(0);
+  }
 }
 
 namespace lanes {
@@ -358,7 +410,7 @@ HWY_EXPORT(sort_samples);
 HWY_EXPORT(add_node_series);
 HWY_EXPORT(add_sample_series);
 HWY_EXPORT(add_coarsely);
-HWY_EXPORT(least_of_channels);
+HWY_EXPORT(make_limits);
 
 void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
                  std::array<double, 3>& total) {
@@ -380,9 +432,8 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
                            Float4& total) {
   return HWY_DYNAMIC_DISPATCH(add_coarsely)(kernel, test, lists, total);
 }
-void least_of_channels(const std::array<const float*, 3>& a, const std::array<const float*, 3>& b,
-                       const Rgb& share, std::size_t count, float* out) {
-  HWY_DYNAMIC_DISPATCH(least_of_channels)(a, b, share, count, out);
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
+  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, limits);
 }
 
 }  // namespace lanes

@@ -11,7 +11,7 @@
 
 namespace nacre {
 
-/// Sources side by side, coordinate by coordinate, padded with dark ones to whole vectors.
+/// Sources side by side, coordinates field by field, padded with dark ones to whole vectors.
 class SourceList {
  public:
   void clear() noexcept { size_ = 0; }
@@ -23,12 +23,15 @@ class SourceList {
   /// Has to be called between the last `add` and a sum.
   void pad();
 
-  enum Field { kX, kY, kZ, kArea, kR, kG, kB, kFieldCount };
+  enum Field { kX, kY, kZ, kArea, kFieldCount };
   const float* field(Field f) const noexcept { return fields_[f].data(); }
-  float* end(Field f) noexcept { return fields_[f].data() + size_; }
+  float* field(Field f) noexcept { return fields_[f].data(); }
+  const Float4* powers() const noexcept { return powers_.data(); }
+  Float4* powers() noexcept { return powers_.data(); }
 
  private:
   std::array<std::vector<float>, kFieldCount> fields_;
+  std::vector<Float4> powers_;
   std::size_t size_ = 0;
 };
 
@@ -68,19 +71,28 @@ class IndexList {
   std::size_t size_ = 0;
 };
 
+/// What nodes at some distance are measured against: what the first moment counts against the spread, and the
+/// largest spread that a point, a series may stand for.
+enum Limit { kLean, kAsPoint, kInSeries, kLimitCount = 4 };
+
+/// What limits are made of, by bin and channel: kLean; what the node's own contribution allows as a point, in
+/// a series; what a share of the sum allows.
+struct LimitTables {
+  const float* lean;
+  std::array<const float*, 3> as_point, in_series, per_bend;
+};
+
 /// How a target looks at nodes.
 struct NodeTest {
   const SumNode* nodes;
-  Vec3 centre;        // of the target
-  float radius;       // of a ball around all its points
-  float nearest;      // within this distance samples are summed one by one
-  bool open_small;    // whether nodes smaller than the target are opened rather than left to its parts
-  bool certified;     // whether distances are to the nearest that a sample of the node may be
-  float ratio;        // then: the largest of radius to distance
-  DistanceBins bins;  // of the tables below
-  const float* lean;  // what the first moment counts
-  const float* as_point;
-  const float* in_series;  // the largest spread that a point, a series may stand for
+  Vec3 centre;          // of the target
+  float radius;         // of a ball around all its points
+  float nearest;        // within this distance samples are summed one by one
+  bool open_small;      // whether nodes smaller than the target are opened rather than left to its parts
+  bool certified;       // whether distances are to the nearest that a sample of the node may be
+  float ratio;          // then: the largest of radius to distance
+  DistanceBins bins;    // of the limits
+  const float* limits;  // by bin, see Limit
 };
 
 /// How the sum is guessed, or bounded from below.
@@ -117,9 +129,8 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
 /// how many were added.
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total);
-/// out[i] = min over channels of a_k[i] + share_k b_k[i]; whole vectors are read and written.
-void least_of_channels(const std::array<const float*, 3>& a, const std::array<const float*, 3>& b,
-                       const Rgb& share, std::size_t count, float* out);
+/// Limits of `count` bins for a share of the sum; whole vectors are read and written.
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits);
 
 }  // namespace lanes
 }  // namespace nacre

@@ -20,13 +20,14 @@ struct SumSource {
 /// A node of the octree as they do.
 struct SumNode {
   float x, y, z, radius;
-  float spread;   // largest over channels of half the second moment over the power; -1 for a dark node
-  float lean;     // the same of the first moment
-  float opening;  // radius, 0 for a leaf
-  float power[3];
-  std::uint32_t first_child, packed_counts, first_sample;
-  std::uint32_t child_count() const noexcept { return packed_counts >> 28; }
-  std::uint32_t sample_count() const noexcept { return packed_counts & 0x0fffffffu; }
+  float spread;         // largest over channels of half the second moment over the power; -1 for a dark node
+  float lean;           // the same of the first moment
+  std::uint32_t first;  // child, or sample of a leaf
+  std::uint32_t packed_counts;
+  Float4 power;
+  static constexpr int kChildShift = 28;
+  std::uint32_t child_count() const noexcept { return packed_counts >> kChildShift; }
+  std::uint32_t sample_count() const noexcept { return packed_counts & ((1u << kChildShift) - 1); }
 };
 
 /// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
