@@ -15,11 +15,15 @@ namespace {
 // its lower bound.
 constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 
+// What a node's third moments and the change of its second ones over a target come to, for the same reasons
+// as kCalibration, as long as its radius is at most this share of its distance.
+constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
+
 // Largest cells that take over the guess of the cell around them.
 constexpr int kInheritLevel = 1;
 
 // Points per cell above which smaller ones are cheaper.
-constexpr std::size_t kPointsPerCell = 48;
+constexpr std::size_t kPointsPerCell = 32;
 
 }  // namespace
 
@@ -117,19 +121,24 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
   };
   room.limits.resize(kLimitCount * lean_.size());
-  lanes::make_limits({lean_.data(), data(radius.as_point), data(radius.in_series), data(per_bend_)}, share,
-                     lean_.size(), room.limits.data());
+  lanes::make_limits(
+      {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(per_third_)}, share,
+      lean_.size(), room.limits.data());
   // All that is nearer than the bins reach.
   room.limits[kAsPoint] = room.limits[kInSeries] = -1;
 
+  const bool certified = promise_ == Promise::kCertified;
+  const float weight = certified ? 1 : kMomentWeight;
   SortedNodes& nodes = room.nodes;
   const NodeTest test{.nodes = nodes_.data(),
                       .centre = target.centre,
                       .radius = target.radius,
                       .nearest = nearest_,
                       .open_small = is_leaf,
-                      .certified = promise_ == Promise::kCertified,
-                      .ratio = static_cast<float>(kCertifiedRatio),
+                      .certified = certified,
+                      .ratio = certified ? static_cast<float>(kCertifiedRatio) : kRatio,
+                      .reach = weight * target.radius,
+                      .third = weight / 3,
                       .bins = bins_,
                       .limits = room.limits.data()};
   nodes.far.clear();

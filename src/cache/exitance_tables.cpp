@@ -12,10 +12,11 @@ namespace nacre {
 namespace {
 
 // The estimate of a node's error takes all its samples to lie where the profile bends most and adds up errors
-// that mostly cancel; what happens is smaller by this factor, about the same for every profile, material,
-// shape (thin double sheets are the worst) and tolerance (tests/cache/exitance_test.cpp), which `tolerance`,
-// a relative RMSE over a picture, makes use of.
-constexpr double kCalibration = 11.5;
+// that mostly cancel, the more of them the smaller they are. What happens is smaller by this factor at a
+// tolerance of 0.001, times (tolerance / 0.001)^kGrowth at larger ones, for every profile, material and shape
+// (tests/cache/exitance_test.cpp; light of several colours is the worst), which `tolerance`, a relative RMSE
+// over a picture, makes use of.
+constexpr double kCalibration = 11.5, kGrowth = 0.2;
 
 // A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
 // share of the bound on its third derivatives.
@@ -36,7 +37,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
       sources_(group.size()),
       kernel_(make_profiles(medium)),
       promise_(promise),
-      allowance_(tolerance * kCalibration) {
+      allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
   // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
   if (kernel_.singular()) {
@@ -64,6 +65,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   if (promise == Promise::kCertified) {
     const double tables = kernel_.relative_error(size.length()) + kRounding;
     allowance_ = tolerance - tables;
+    moment_slack_ += static_cast<float>(kernel_.relative_error_of_jets(size.length()));
     if (!(allowance_ > tables))
       fail(ErrorCode::kLimit, group.name,
            "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of "
@@ -76,34 +78,12 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   make_tables();
 }
 
-void Exitance::make_nodes() {
-  nodes_.resize(group_.nodes.size());
-  parallel_for(nodes_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const OctreeNode& from = group_.nodes[i];
-      SumNode& node = nodes_[i];
-      node = {from.centre[0],
-              from.centre[1],
-              from.centre[2],
-              from.radius,
-              -1,
-              0,
-              from.child_count() > 0 ? from.first_child : from.first_sample,
-              from.packed_counts,
-              Float4{from.power[0], from.power[1], from.power[2], 0}};
-      for (int k = 0; k < 3; ++k)
-        if (from.power[k] > 0) {
-          // Rounded up by more than division and the bounds' product lose.
-          node.spread = std::max(node.spread, 0.5000003f * from.second_moment[k] / from.power[k]);
-          node.lean = std::max(node.lean, 1.0000005f * from.first_moment[k] / from.power[k]);
-        }
-    }
-  });
-}
-
-// A node as a point errs in channel k by at most P_k (spread H_k + lean S_k), where H and S bound second and
-// first derivatives; its series by P_k T_k radius^3 / 6 more. Allowed is P_k (own K_k + share_k), so that
-// spread + lean max(S/H) may be at most the least (own K_k + share_k [- T_k radius^3 / 6]) / H_k.
+// Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their
+// second moments, a node errs in channel k by at most P_k (T_k (spread (rho/3 + R) + R^3/6) + S_k lean + H_k
+// tint), where S, H and T bound first, second and third derivatives: what is left out are third moments, the
+// change of second moments' contribution over the target, its series' third order, and what differs between
+// channels. As a point, by P_k (H_k spread + S_k lean). Allowed is P_k (own K_k + share_k). Divided by P_k
+// T_k, and the least of channels taken, that leaves tables over distance against a node's own numbers.
 void Exitance::make_tables() {
   const DistanceBins all = kernel_.bound_bins();
   const auto bin_of = [&](double distance) {
@@ -130,14 +110,16 @@ void Exitance::make_tables() {
   const OctreeNode& root = group_.nodes[0];
 
   lean_.assign(padded, 0);
-  for (auto& channel : per_bend_) channel.assign(padded, 0);
+  bend_.assign(padded, 0);
+  for (auto& channel : per_third_) channel.assign(padded, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const Kernel::Bounds& bounds = kernel_.bounds(edge2(i));
     for (int k = 0; k < 3; ++k)
       if (root.power[k] > 0) {
-        const float hessian = std::max(bounds.hessian[k], 1 / kNoLimit);
-        per_bend_[static_cast<std::size_t>(k)][i] = 1 / hessian;
-        lean_[i] = std::max(lean_[i], std::min(bounds.slope[k] / hessian, kNoLimit));
+        const float third = std::max(bounds.third[k], 1 / kNoLimit);
+        per_third_[static_cast<std::size_t>(k)][i] = 1 / third;
+        lean_[i] = std::max(lean_[i], std::min(bounds.slope[k] / third, kNoLimit));
+        bend_[i] = std::max(bend_[i], std::min(bounds.hessian[k] / third, kNoLimit));
       }
   }
   const double smallest = cell_size_ * kSmallestRadius;
@@ -157,11 +139,15 @@ void Exitance::make_tables() {
           const double near = std::sqrt(double{edge2(i + 1)});
           const double there = certified ? (1 + 2 * kCertifiedRatio) * near + 2 * radius : near + radius;
           const double value = own * double{kernel_.eval(static_cast<float>(square(there)))[channel]};
-          const double series =
-              weight * radius * radius * radius * double{kernel_.bounds(edge2(i)).third[channel]};
+          const Kernel::Bounds& bounds = kernel_.bounds(edge2(i));
+          const double bend = double{bounds.hessian[channel]}, slope = double{bounds.slope[channel]};
+          double series = weight * radius * radius * radius * double{bounds.third[channel]};
+          if (certified)
+            series += kernel_.relative_error_of_jets(std::sqrt(edge2(i + 1))) * radius *
+                      (slope + 0.5 * bend * radius);
           const auto limit = [&](double allowed) {
             return static_cast<float>(
-                std::clamp(allowed * double{per_bend_[k][i]}, -double{kNoLimit}, double{kNoLimit}));
+                std::clamp(allowed * double{per_third_[k][i]}, -double{kNoLimit}, double{kNoLimit}));
           };
           as_point[i] = limit(value);
           in_series[i] = limit(value - series);

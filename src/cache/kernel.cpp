@@ -183,12 +183,23 @@ void Kernel::make_middles() {
   }
 }
 
+namespace {
+
+// As a function of s = r^2 the profile falls locally like a power, at most (3 + sigma r)/2, and over a cell
+// of width h s a chord errs by at most h^2/8 of s^2 R''/R. A tenth is added for rounding of the cells' ends.
+double error_of_chords(int bits, double power) {
+  return 1.1 * square(1.0 / (1 << bits)) / 8 * power * (power + 1);
+}
+
+}  // namespace
+
 double Kernel::relative_error(float distance) const noexcept {
-  // As a function of s = r^2 the profile falls locally like a power, at most (3 + sigma r)/2, and over a cell
-  // of width h s a chord errs by at most h^2/8 of s^2 R''/R. A tenth is added for rounding of the cells'
-  // ends.
-  const double power = (3 + std::min(steepest_ * double{distance}, 80.0)) / 2;
-  return 1.1 * square(1.0 / (1 << kCellBits)) / 8 * power * (power + 1);
+  return error_of_chords(kCellBits, (3 + std::min(steepest_ * double{distance}, 80.0)) / 2);
+}
+
+// They fall by up to four powers of r more.
+double Kernel::relative_error_of_jets(float distance) const noexcept {
+  return error_of_chords(kJetBits, (7 + std::min(steepest_ * double{distance}, 80.0)) / 2);
 }
 
 Float4 Kernel::eval_disc(float r2, float area) const noexcept {

@@ -2,6 +2,7 @@
 #include "cache/sum_lanes.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #define HWY_COMPILE_ALL_ATTAINABLE  // the plain one, too
 #undef HWY_TARGET_INCLUDE
@@ -163,7 +164,14 @@ enum NodeField {
   kNodeLean,
   kNodeFirst,
   kNodeCounts,
-  kNodePower
+  kNodePower,
+  kNodeXX = 12,
+  kNodeYY,
+  kNodeZZ,
+  kNodeYZ,
+  kNodeZX,
+  kNodeXY,
+  kNodeTint
 };
 // And of a SumSource.
 enum SourceField { kSourceX, kSourceY, kSourceZ, kSourceArea, kSourcePower };
@@ -190,12 +198,17 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const VI row = hn::ShiftLeft<2>(bin);
     const auto limit = [&](Limit which, VI at)
                            HWY_ATTR { return hn::GatherIndex(df, test.limits + which, at); };
-    const VF error = hn::MulAdd(node(kNodeLean), limit(kLean, row), spread);
+    const VF lean = node(kNodeLean), to_lean = limit(kLean, row), to_bend = limit(kBend, row);
+    // In a series, as a point.
+    const VF moments = hn::MulAdd(hn::Set(df, test.third), radius, hn::Set(df, test.reach));
+    const VF series_error =
+        hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(node(kNodeTint), to_bend)));
+    const VF point_error = hn::MulAdd(spread, to_bend, hn::Mul(lean, to_lean));
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
     auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
-    if (test.certified) apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
-    const auto far = hn::And(apart, hn::Le(error, limit(kInSeries, row)));
-    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(error, limit(kAsPoint, row))));
+    apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
+    const auto far = hn::And(apart, hn::Le(series_error, limit(kInSeries, row)));
+    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, limit(kAsPoint, row))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
     const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
     const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
@@ -247,6 +260,9 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
   constexpr std::size_t kRun = 128;
   const Float4 middle{centre.x, centre.y, centre.z, 0};
   HWY_ALIGN Float4 offsets[kRun];
+  // Second moments of nodes: their trace, and twice what they stretch along the offset.
+  constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
+  HWY_ALIGN float traces[kMoments ? kRun : 1], stretches[kMoments ? kRun : 1];
   Rows<kInterpolated, 1, kRun> values(kernel.cells);
   Rows<kInterpolated, 2, kRun> jets(kernel.jets);
   for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
@@ -262,6 +278,18 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
       const VF r2 = length2(x, y, z);
       values.find(i, kernel.cell_bins, r2);
       jets.find(i, kernel.jet_bins, r2);
+      if constexpr (kMoments) {
+        const Batch batch = load_batch(far.data() + begin, i, size);
+        const Fields node = gather(structs, batch.index);
+        const VF xx = node(kNodeXX), yy = node(kNodeYY), zz = node(kNodeZZ);
+        const VF across =
+            hn::MulAdd(hn::Mul(x, y), node(kNodeXY),
+                       hn::MulAdd(hn::Mul(y, z), node(kNodeYZ), hn::Mul(hn::Mul(z, x), node(kNodeZX))));
+        const VF along =
+            hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
+        hn::Store(hn::Add(xx, hn::Add(yy, zz)), df, traces + i);
+        hn::Store(hn::MulAdd(hn::Set(df, 2), across, along), df, stretches + i);
+      }
     }
     // Each sum in a register of its own.
     Float4 value{}, trace{}, slope_x{}, slope_y{}, slope_z{}, xx{}, yy{}, zz{}, yz{}, zx{}, xy{};
@@ -270,6 +298,10 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
       const Float4 x = broadcast(offsets[i][0]), y = broadcast(offsets[i][1]), z = broadcast(offsets[i][2]);
       value = mul_add(power, values(i, 0), value);
       const Float4 radial = power * jets(i, 0), bend = power * jets(i, 1);
+      if constexpr (kMoments) {
+        value = mul_add(radial, broadcast(traces[i]), value);
+        value = mul_add(bend, broadcast(stretches[i]), value);
+      }
       trace += radial;
       slope_x = mul_add(radial, x, slope_x);
       slope_y = mul_add(radial, y, slope_y);
@@ -359,11 +391,11 @@ void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count,
     VF point = hn::Set(df, 3e38f), series = point;
     for (std::size_t k = 0; k < 3; ++k) {
       const VF allowed =
-          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_bend[k] + i));
+          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_third[k] + i));
       point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, tables.as_point[k] + i)));
       series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
     }
-    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), point, series, hn::Zero(df), df,
+    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), hn::LoadU(df, tables.bend + i), point, series, df,
                           limits + kLimitCount * i);
   }
 }

@@ -71,15 +71,15 @@ class IndexList {
   std::size_t size_ = 0;
 };
 
-/// What nodes at some distance are measured against: what the first moment counts against the spread, and the
-/// largest spread that a point, a series may stand for.
-enum Limit { kLean, kAsPoint, kInSeries, kLimitCount = 4 };
+/// What nodes at some distance are measured against: what first and second moments count against the third,
+/// and the largest of their sum that a point, a series may stand for.
+enum Limit { kLean, kBend, kAsPoint, kInSeries, kLimitCount };
 
-/// What limits are made of, by bin and channel: kLean; what the node's own contribution allows as a point, in
-/// a series; what a share of the sum allows.
+/// What limits are made of, by bin and channel: the first two; what the node's own contribution allows as a
+/// point, in a series; what a share of the sum allows.
 struct LimitTables {
-  const float* lean;
-  std::array<const float*, 3> as_point, in_series, per_bend;
+  const float *lean, *bend;
+  std::array<const float*, 3> as_point, in_series, per_third;
 };
 
 /// How a target looks at nodes.
@@ -90,7 +90,8 @@ struct NodeTest {
   float nearest;        // within this distance samples are summed one by one
   bool open_small;      // whether nodes smaller than the target are opened rather than left to its parts
   bool certified;       // whether distances are to the nearest that a sample of the node may be
-  float ratio;          // then: the largest of radius to distance
+  float ratio;          // the largest of a node's radius to its distance
+  float reach, third;   // what the spread counts, and that times the node's radius
   DistanceBins bins;    // of the limits
   const float* limits;  // by bin, see Limit
 };
@@ -120,7 +121,7 @@ void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3&
 void sort_nodes(const NodeTest& test, SortedNodes& lists);
 /// The same for `samples`: `far_samples`, or the list.
 void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near);
-/// Adds nodes as points, samples, to the Taylor series of a target.
+/// Adds nodes with their second moments, samples, to the Taylor series of a target.
 void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                 const Vec3& centre, LocalExpansion& expansion);
 void add_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,

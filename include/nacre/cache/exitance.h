@@ -17,14 +17,17 @@ struct SumSource {
   float x, y, z, area;  // share of the surface, 0 for a node
   Float4 power;         // E_t A
 };
-/// A node of the octree as they do.
+/// A node of the octree as they do. Second moments are those of E_t A over its sum, halved, about x, y, z.
 struct SumNode {
   float x, y, z, radius;
-  float spread;         // largest over channels of half the second moment over the power; -1 for a dark node
-  float lean;           // the same of the first moment
+  float spread;         // trace of the second moment, the largest of a channel; -1 for a dark node
+  float lean;           // length of the first moment, the largest of a channel
   std::uint32_t first;  // child, or sample of a leaf
   std::uint32_t packed_counts;
   Float4 power;
+  float xx, yy, zz, yz, zx, xy;  // second moment of all channels together
+  float tint;                    // largest norm of a channel's difference from that
+  float spare;
   static constexpr int kChildShift = 28;
   std::uint32_t child_count() const noexcept { return packed_counts >> kChildShift; }
   std::uint32_t sample_count() const noexcept { return packed_counts & ((1u << kChildShift) - 1); }
@@ -84,7 +87,10 @@ class Exitance {
   struct Target;
   struct Room;
 
+  struct Moments;
   void make_nodes();
+  Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
+                      std::span<const Moments> moments);
   void make_tables();
   bool in_grid(const Vec3& x) const noexcept;
   void eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
@@ -100,13 +106,14 @@ class Exitance {
   Kernel kernel_;
   Promise promise_;
   double allowance_;
-  float nearest_ = 0;      // distance within which samples are summed one by one
-  Vec3d origin_{0, 0, 0};  // corner of the first cell
+  float moment_slack_ = 1e-6f;  // what rounding and tables may take from second moments
+  float nearest_ = 0;           // distance within which samples are summed one by one
+  Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1;
   DistanceBins bins_{};
-  std::vector<Radius> radii_;                   // from the smallest cell on, kRadiiPerOctave each
-  std::array<std::vector<float>, 3> per_bend_;  // what a share of the sum allows, by channel
-  std::vector<float> lean_;                     // by bin, what the first moment counts against the spread
+  std::vector<Radius> radii_;                    // from the smallest cell on, kRadiiPerOctave each
+  std::array<std::vector<float>, 3> per_third_;  // what a share of the sum allows, by channel
+  std::vector<float> lean_, bend_;  // by bin, what first and second moments count against the third
 };
 
 }  // namespace nacre

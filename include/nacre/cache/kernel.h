@@ -51,6 +51,8 @@ class Kernel {
   /// The largest relative error of `eval` up to a distance, which linear interpolation makes where the
   /// profile falls like exp(-sigma_tr r) within a cell.
   double relative_error(float distance) const noexcept;
+  /// The same of the derivatives in `eval_jet`.
+  double relative_error_of_jets(float distance) const noexcept;
   /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
   static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
   bool singular() const noexcept { return singular_; }
