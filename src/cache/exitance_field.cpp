@@ -40,6 +40,15 @@ ExitanceField::Patch ExitanceField::patch(std::uint32_t index) const noexcept {
   return {{t[0], t[1], t[2], kNone, kNone, kNone}};
 }
 
+void ExitanceField::fetch_nodes(std::uint32_t index) const noexcept {
+  if (index < corners_.size()) {
+    for (const std::uint32_t node : corners_[index]) __builtin_prefetch(&values_[node]);
+  } else {
+    for (const std::uint32_t node : patches_[index - corners_.size()].nodes)
+      __builtin_prefetch(&values_[node != kNone ? node : 0]);
+  }
+}
+
 // Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.
 void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const {
   std::vector<Vec3> positions;
@@ -166,7 +175,12 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     const Hit& ahead = hits[std::min(i + kTogether, hits.size() - 1)];
     __builtin_prefetch(&parts_[first_triangle_[ahead.mesh] + ahead.triangle]);
     places[i].patch = find_patch(hits[i], places[i].u, places[i].v);
-    __builtin_prefetch(&patch_state_[places[i].patch]);
+    const std::uint32_t patch = places[i].patch;
+    __builtin_prefetch(&patch_state_[patch]);
+    if (patch < corners_.size())
+      __builtin_prefetch(&corners_[patch]);
+    else
+      __builtin_prefetch(&patches_[patch - corners_.size()]);
   }
   for (const Place& place : places)
     if (!patch_state_[place.patch].load(std::memory_order_acquire)) missing.push_back(place.patch);
@@ -180,22 +194,25 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     std::sort(blocks.begin(), blocks.end());
     blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     await_blocks(blocks, evaluations);
-    for (const std::uint32_t index : missing) judge(index);
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+      fetch_nodes(missing[std::min(i + kTogether, missing.size() - 1)]);
+      judge(missing[i]);
+    }
   }
   std::vector<std::uint32_t> steep;
-  std::array<Patch, kTogether> fetched;
   for (std::size_t begin = 0; begin < hits.size(); begin += kTogether) {
-    const std::size_t count = std::min(kTogether, hits.size() - begin);
-    for (std::size_t i = 0; i < count; ++i) {
-      fetched[i] = patch(places[begin + i].patch);
-      for (const std::uint32_t node : fetched[i].nodes)
-        if (node != kNone) __builtin_prefetch(&values_[node]);
-    }
-    for (std::size_t i = begin; i < begin + count; ++i) {
-      if (patch_state_[places[i].patch].load(std::memory_order_acquire) == kSteep)
+    const std::size_t end = std::min(begin + kTogether, hits.size());
+    for (std::size_t i = begin; i < end; ++i) fetch_nodes(places[i].patch);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Place& place = places[i];
+      if (patch_state_[place.patch].load(std::memory_order_acquire) == kSteep) {
         steep.push_back(static_cast<std::uint32_t>(i));
-      else
-        exitance[i] = interpolate(fetched[i - begin], places[i].u, places[i].v);
+      } else if (place.patch < corners_.size()) {
+        const auto& [a, b, c] = corners_[place.patch];
+        exitance[i] = values_[a] * (1 - place.u - place.v) + values_[b] * place.u + values_[c] * place.v;
+      } else {
+        exitance[i] = interpolate(patches_[place.patch - corners_.size()], place.u, place.v);
+      }
     }
   }
   if (steep.empty()) return;

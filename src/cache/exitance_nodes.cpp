@@ -12,6 +12,9 @@ namespace {
 // Triangles that are divided side by side.
 constexpr std::size_t kRun = 8192;
 
+// Edges up to this length, squared, have no midpoint.
+float straight_edge2(double distance) { return static_cast<float>(square(distance / 3)); }
+
 // Numbers for keys in the order of their first appearance: open addressing.
 template <class Key, class Hash>
 class Numbering {
@@ -79,7 +82,7 @@ class ExitanceField::Divider {
   Divider(std::span<const Vec3> vertices, double distance, Division& into)
       : vertices_(vertices),
         longest2_(static_cast<float>(square(distance))),
-        straight2_(static_cast<float>(square(distance / 3))),
+        straight2_(straight_edge2(distance)),
         into_(into),
         extras_(2 * (into.end - into.begin)) {}
 
@@ -158,6 +161,7 @@ class ExitanceField::Divider {
 };
 
 double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double distance) {
+  const float straight2 = straight_edge2(distance);
   double nodes = 0;
   for (const Mesh* const mesh : meshes) {
     if (!mesh) continue;
@@ -167,6 +171,10 @@ double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double 
       for (std::size_t i = first * kRun; i < std::min(last * kRun, triangles.size()); ++i) {
         const Triangle& t = triangles[i];
         const Vec3 a = mesh->positions[t[0]], ab = mesh->positions[t[1]] - a, ac = mesh->positions[t[2]] - a;
+        if (std::max({ab.length2(), ac.length2(), (ac - ab).length2()}) <= straight2) {
+          runs[i / kRun] += 1;
+          continue;
+        }
         // Edges count for slivers.
         runs[i / kRun] += 1 + 2 * double{ab.length() + ac.length() + (ac - ab).length()} / distance +
                           5 * double{ab.cross(ac).length()} / square(distance);

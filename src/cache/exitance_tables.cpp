@@ -51,6 +51,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   // Whole blocks around all samples, and no more than 2^20 cells an axis.
   cell_size_ = std::max(kCellSpacings * spacing, 0x1p-20 * double{std::max({size.x, size.y, size.z})});
   if (!(cell_size_ > 0)) cell_size_ = 1;
+  cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{box.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
   parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -160,14 +161,14 @@ void Exitance::make_tables() {
 std::uint64_t Exitance::cell_code(const Vec3& x) const noexcept {
   std::uint64_t code = 0;
   for (int axis = 0; axis < 3; ++axis)
-    code |= spread_bits(static_cast<std::uint64_t>(
-                std::clamp((static_cast<double>(x[axis]) - origin_[axis]) / cell_size_, 0.0, 0x1p21 - 1)))
+    code |= spread_bits(static_cast<std::uint64_t>(std::clamp(
+                (static_cast<double>(x[axis]) - origin_[axis]) * cells_per_unit_, 0.0, 0x1p21 - 1)))
             << axis;
   return code;
 }
 
 bool Exitance::in_grid(const Vec3& x) const noexcept {
-  const Vec3d offset = (Vec3d(x) - origin_) / cell_size_;
+  const Vec3d offset = (Vec3d(x) - origin_) * cells_per_unit_;
   return std::min({offset.x, offset.y, offset.z}) >= 0 && std::max({offset.x, offset.y, offset.z}) < 0x1p21;
 }
 

@@ -109,7 +109,7 @@ class Exitance {
   float moment_slack_ = 1e-6f;  // what rounding and tables may take from second moments
   float nearest_ = 0;           // distance within which samples are summed one by one
   Vec3d origin_{0, 0, 0};       // corner of the first cell
-  double cell_size_ = 1;
+  double cell_size_ = 1, cells_per_unit_ = 1;
   DistanceBins bins_{};
   std::vector<Radius> radii_;                    // from the smallest cell on, kRadiiPerOctave each
   std::array<std::vector<float>, 3> per_third_;  // what a share of the sum allows, by channel

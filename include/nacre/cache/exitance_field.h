@@ -69,6 +69,7 @@ class ExitanceField {
   Patch patch(std::uint32_t index) const noexcept;
   void await_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
+  void fetch_nodes(std::uint32_t index) const noexcept;
   void judge(std::uint32_t index) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
   Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
