@@ -10,7 +10,7 @@
 namespace nacre {
 namespace {
 
-// Those that sum_lanes.cpp is compiled for; a lower bit is a better target.
+// Those that inner loops are compiled for; a lower bit is a better target.
 constexpr std::int64_t kCompiled = HWY_ATTAINABLE_TARGETS;
 
 std::string name_of(std::int64_t target) {

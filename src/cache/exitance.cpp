@@ -22,8 +22,9 @@ constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
 // Largest cells that take over the guess of the cell around them.
 constexpr int kInheritLevel = 1;
 
-// Points per cell above which smaller ones are cheaper.
-constexpr std::size_t kPointsPerCell = 32;
+// Points in a cell of so many distances of samples above which smaller ones are cheaper; where samples are
+// denser, fewer are.
+constexpr double kPointsPerCell = 32, kSpacingsPerCell = 2;
 
 }  // namespace
 
@@ -104,8 +105,10 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   place(target, range, level, room);
   target.far = parent ? parent->far.moved(target.centre - parent->centre) : LocalExpansion{};
   target.pending.clear();
-  const bool is_leaf = level == 0 || (room.whole ? level <= kWholeLevel && range.size() <= kPointsPerCell
-                                                 : level <= kLeafLevel);
+  const double side = cell_size_ * static_cast<double>(1 << level) / spacing_;
+  const double work = static_cast<double>(range.size()) * std::max(1.0, std::sqrt(side / kSpacingsPerCell));
+  const bool is_leaf =
+      level == 0 || (room.whole ? level <= kWholeLevel && work <= kPointsPerCell : level <= kLeafLevel);
 
   // The sum hardly changes within a cell of a few samples.
   target.total = room.whole && level <= kInheritLevel ? parent->total : weigh(target, room);
@@ -240,7 +243,7 @@ void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
   SourceList list;
   for (std::size_t begin = 0; begin < sources_.size(); begin += kChunk) {
     list.clear();
-    list.add(std::span(sources_).subspan(begin, std::min(kChunk, sources_.size() - begin)));
+    list.add(std::span<const SumSource>(sources_).subspan(begin, std::min(kChunk, sources_.size() - begin)));
     list.pad();
     for (std::size_t i = 0; i < points.size(); ++i)
       lanes::add_sources(kernel_.tables(), list, points[i], totals[i]);

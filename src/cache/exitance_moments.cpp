@@ -7,80 +7,88 @@
 
 namespace nacre {
 
-// Moments of the samples below a node about its centre, channel by channel.
+// Moments of the samples below a node about its centre, channels side by side.
 struct Exitance::Moments {
-  struct Channel {
-    double power = 0;
-    Vec3d first{0, 0, 0};
-    std::array<double, 6> second{};  // xx yy zz yz zx xy
+  Float4 power = broadcast(0);
+  std::array<Float4, 3> first{power, power, power};
+  std::array<Float4, 6> second{power, power, power, power, power, power};  // xx yy zz yz zx xy
 
-    void add(const Channel& from, const Vec3d& d) {
-      const Vec3d& m = from.first;
-      const double p = from.power;
-      power += p;
-      first += m + d * p;
-      const std::array<double, 6> moved{d.x * (2 * m.x + p * d.x),         d.y * (2 * m.y + p * d.y),
-                                        d.z * (2 * m.z + p * d.z),         d.y * m.z + d.z * (m.y + p * d.y),
-                                        d.z * m.x + d.x * (m.z + p * d.z), d.x * m.y + d.y * (m.x + p * d.x)};
-      for (std::size_t i = 0; i < 6; ++i) second[i] += from.second[i] + moved[i];
-    }
-  };
-  std::array<Channel, 3> channels;
+  void add_sample(const Float4& p, const Vec3& d) {
+    const std::array<Float4, 3> moved{p * broadcast(d.x), p * broadcast(d.y), p * broadcast(d.z)};
+    power += p;
+    for (std::size_t i = 0; i < 3; ++i) first[i] += moved[i];
+    second[0] += moved[0] * broadcast(d.x);
+    second[1] += moved[1] * broadcast(d.y);
+    second[2] += moved[2] * broadcast(d.z);
+    second[3] += moved[1] * broadcast(d.z);
+    second[4] += moved[2] * broadcast(d.x);
+    second[5] += moved[0] * broadcast(d.y);
+  }
+
+  // Those of a part whose own are about a point at `d`.
+  void add(const Moments& part, const Vec3& d) {
+    const std::array<Float4, 3>& m = part.first;
+    const Float4 x = broadcast(d.x), y = broadcast(d.y), z = broadcast(d.z);
+    add_sample(part.power, d);
+    for (std::size_t i = 0; i < 3; ++i) first[i] += m[i];
+    second[0] += part.second[0] + broadcast(2) * m[0] * x;
+    second[1] += part.second[1] + broadcast(2) * m[1] * y;
+    second[2] += part.second[2] + broadcast(2) * m[2] * z;
+    second[3] += part.second[3] + m[1] * z + m[2] * y;
+    second[4] += part.second[4] + m[2] * x + m[0] * z;
+    second[5] += part.second[5] + m[0] * y + m[1] * x;
+  }
 };
 
 // Those of node `index`, written into it and into all below but the ones `known` (sorted), which have
 // `moments`.
 Exitance::Moments Exitance::add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                                         std::span<const Moments> moments) {
-  const auto at = std::ranges::lower_bound(known, index);
-  if (at != known.end() && *at == index) return moments[static_cast<std::size_t>(at - known.begin())];
+  if (!known.empty()) {
+    const auto at = std::ranges::lower_bound(known, index);
+    if (at != known.end() && *at == index) return moments[static_cast<std::size_t>(at - known.begin())];
+  }
   SumNode& node = nodes_[index];
-  const Vec3d centre(node.x, node.y, node.z);
+  const Vec3 centre(node.x, node.y, node.z);
   Moments sum;
   for (std::uint32_t c = 0; c < node.child_count(); ++c) {
     const SumNode& child = nodes_[node.first + c];
-    const Moments below = add_moments(node.first + c, known, moments);
-    for (std::size_t k = 0; k < 3; ++k)
-      sum.channels[k].add(below.channels[k], Vec3d(child.x, child.y, child.z) - centre);
+    sum.add(add_moments(node.first + c, known, moments), Vec3(child.x, child.y, child.z) - centre);
   }
   if (node.child_count() == 0)
     for (std::uint32_t i = node.first; i < node.first + node.sample_count(); ++i) {
       const SumSource& s = sources_[i];
-      for (std::size_t k = 0; k < 3; ++k) {
-        Moments::Channel sample;
-        sample.power = static_cast<double>(s.power[static_cast<int>(k)]);
-        sum.channels[k].add(sample, Vec3d(s.x, s.y, s.z) - centre);
-      }
+      sum.add_sample(s.power, Vec3(s.x, s.y, s.z) - centre);
     }
-  double power = 0;
-  std::array<double, 6> mean{};
-  for (const Moments::Channel& channel : sum.channels) {
-    power += channel.power;
-    for (std::size_t i = 0; i < 6; ++i) mean[i] += channel.second[i];
-  }
+  const auto of_all = [](const Float4& channels) { return channels[0] + channels[1] + channels[2]; };
+  const float power = of_all(sum.power);
   if (!(power > 0)) return sum;
-  for (double& m : mean) m *= 0.5 / power;
-  double tint2 = 0;
-  for (const Moments::Channel& channel : sum.channels) {
-    if (!(channel.power > 0)) continue;
-    double norm2 = 0;
-    for (std::size_t i = 0; i < 6; ++i)
-      norm2 += (i < 3 ? 1 : 2) * square(0.5 * channel.second[i] / channel.power - mean[i]);
-    tint2 = std::max(tint2, norm2);
+  // Without light in a channel, nothing there differs.
+  const auto lit = sum.power > broadcast(0);
+  const Float4 per_power = lit ? broadcast(0.5f) / sum.power : broadcast(0);
+  Float4 norm2 = broadcast(0);
+  std::array<float, 6> mean;
+  for (std::size_t i = 0; i < 6; ++i) {
+    mean[i] = 0.5f * of_all(sum.second[i]) / power;
+    const Float4 difference = sum.second[i] * per_power - broadcast(mean[i]);
+    norm2 += broadcast(i < 3 ? 1 : 2) * difference * difference;
   }
-  node.xx = static_cast<float>(mean[0]);
-  node.yy = static_cast<float>(mean[1]);
-  node.zz = static_cast<float>(mean[2]);
-  node.yz = static_cast<float>(mean[3]);
-  node.zx = static_cast<float>(mean[4]);
-  node.xy = static_cast<float>(mean[5]);
-  // Not less for rounding, of the numbers above either, nor for that of the tables they are multiplied with.
-  node.tint = static_cast<float>(1.0000005 * std::sqrt(tint2)) + moment_slack_ * node.spread;
+  float tint2 = 0;
+  for (int k = 0; k < 3; ++k)
+    if (sum.power[k] > 0) tint2 = std::max(tint2, norm2[k]);
+  node.xx = mean[0];
+  node.yy = mean[1];
+  node.zz = mean[2];
+  node.yz = mean[3];
+  node.zx = mean[4];
+  node.xy = mean[5];
+  // Not less for rounding, here or in the numbers above, nor for that of the tables they are multiplied with.
+  node.tint = std::sqrt(tint2) + moment_slack_ * node.spread;
   return sum;
 }
 
 void Exitance::make_nodes() {
-  nodes_.resize(group_.nodes.size());
+  nodes_ = LargeArray<SumNode>(group_.nodes.size());
   parallel_for(nodes_.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const OctreeNode& from = group_.nodes[i];
@@ -104,17 +112,15 @@ void Exitance::make_nodes() {
   });
   // Subtrees side by side, then what is above them.
   constexpr std::size_t kSubtrees = 256;
-  std::vector<std::uint32_t> roots{0};
-  for (std::size_t i = 0; i < roots.size() && roots.size() < kSubtrees;) {
+  std::vector<std::uint32_t> roots{0}, inner;
+  for (std::size_t i = 0; i < roots.size() && roots.size() - i < kSubtrees; ++i) {
     const SumNode& node = nodes_[roots[i]];
-    if (node.child_count() == 0) {
-      ++i;
-      continue;
-    }
-    roots.erase(roots.begin() + static_cast<std::ptrdiff_t>(i));
     for (std::uint32_t c = 0; c < node.child_count(); ++c) roots.push_back(node.first + c);
+    if (node.child_count() > 0) inner.push_back(roots[i]);
   }
   std::ranges::sort(roots);
+  std::ranges::sort(inner);
+  std::erase_if(roots, [&](std::uint32_t index) { return std::ranges::binary_search(inner, index); });
   std::vector<Moments> moments(roots.size());
   parallel_for(roots.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) moments[i] = add_moments(roots[i], {}, {});

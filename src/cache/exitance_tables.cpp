@@ -39,29 +39,19 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
       promise_(promise),
       allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
-  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
-  if (kernel_.singular()) {
-    const auto areas = group.plane(Plane::kArea);
-    nearest_ = std::sqrt(Kernel::disc_reach2(*std::max_element(areas.begin(), areas.end())));
-  }
-  const double spacing = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
-  Box3 box;
-  for (std::size_t i = 0; i < group.size(); ++i) box.extendBy(group.position(i));
-  const Vec3 size = box.size();
-  // Whole blocks around all samples, and no more than 2^20 cells an axis.
-  cell_size_ = std::max(kCellSpacings * spacing, 0x1p-20 * double{std::max({size.x, size.y, size.z})});
+  spacing_ = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
+  copy_sources();
+  const Vec3 size = box_.size();
+  // Whole blocks around all samples, and no more than 2^20 cells an axis. Cells are for receivers, too, which
+  // lie closer than a mean free path only where each of them has to be certain.
+  const double length = double{smallest_mean_free_path(medium)} / double{medium.scale};
+  cell_size_ = std::max({kCellSpacings * spacing_, promise == Promise::kCertified ? 0 : kCellLengths * length,
+                         0x1p-20 * double{std::max({size.x, size.y, size.z})}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
+  if (!(spacing_ > 0)) spacing_ = cell_size_;
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
-    origin_[axis] = (std::floor(double{box.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
-  parallel_for(group.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 p = group.position(i);
-      const float area = group.area(i);
-      const Rgb power = group.irradiance(i) * area;
-      sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
-    }
-  });
+    origin_[axis] = (std::floor(double{box_.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
   if (!(tolerance > 0)) return;
   if (promise == Promise::kCertified) {
     const double tables = kernel_.relative_error(size.length()) + kRounding;
@@ -77,6 +67,27 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
   make_nodes();
   make_tables();
+}
+
+void Exitance::copy_sources() {
+  constexpr std::size_t kRun = 1 << 16;
+  std::vector<Box3> boxes((sources_.size() + kRun - 1) / kRun);
+  std::vector<float> largest(boxes.size(), 0.0f);
+  parallel_for(boxes.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t r = first; r < last; ++r)
+      for (std::size_t i = r * kRun; i < std::min((r + 1) * kRun, sources_.size()); ++i) {
+        const Vec3 p = group_.position(i);
+        const float area = group_.area(i);
+        const Rgb power = group_.irradiance(i) * area;
+        sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
+        boxes[r].extendBy(p);
+        largest[r] = std::max(largest[r], area);
+      }
+  });
+  for (const Box3& box : boxes) box_.extendBy(box);
+  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
+  if (kernel_.singular())
+    nearest_ = std::sqrt(Kernel::disc_reach2(*std::max_element(largest.begin(), largest.end())));
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

@@ -1,4 +1,4 @@
-// The same loops for every vector instruction set, chosen at run time.
+// Sums and series for every vector instruction set, chosen at run time.
 #include "cache/sum_lanes.h"
 
 #include <algorithm>
@@ -8,44 +8,11 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "cache/sum_lanes.cpp"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
+
+#include "cache/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace nacre::lanes::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using F = hn::ScalableTag<float>;
-using I = hn::RebindToSigned<F>;
-using U = hn::RebindToUnsigned<F>;
-using VF = hn::Vec<F>;
-using VI = hn::Vec<I>;
-
-HWY_INLINE Float4 mul_add(Float4 a, Float4 b, Float4 c) {
-#if HWY_TARGET == HWY_SCALAR
-  return a * b + c;
-#else
-  const hn::FixedTag<float, 4> d;
-  const auto load = [&](const Float4& x) HWY_ATTR { return hn::Load(d, reinterpret_cast<const float*>(&x)); };
-  Float4 sum;
-  hn::Store(hn::MulAdd(load(a), load(b), load(c)), d, reinterpret_cast<float*>(&sum));
-  return sum;
-#endif
-}
-
-// Where a distance lies in a table: the cell times `stride`, and the fraction of it.
-HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
-  const I di;
-  const VI cell = hn::ShiftRightSame(hn::BitCast(di, r2), bins.shift);
-  return hn::Sub(hn::Min(hn::Max(cell, hn::Set(di, bins.first)), hn::Set(di, bins.last)),
-                 hn::Set(di, bins.first));
-}
-HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
-  const F df;
-  const I di;
-  const std::int32_t mask = (1 << bins.shift) - 1;
-  return hn::Mul(hn::ConvertTo(df, hn::And(hn::BitCast(di, r2), hn::Set(di, mask))),
-                 hn::Set(df, 1.0f / static_cast<float>(1 << bins.shift)));
-}
 
 // Rows of a table for a run of squared distances. A row has fields of three channels, each followed by its
 // difference to the next row if the table is interpolated. Rows are read one by one: a gather takes as long
@@ -67,8 +34,6 @@ struct Rows {
     return at[0];
   }
 };
-
-HWY_INLINE VF length2(VF x, VF y, VF z) { return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))); }
 
 // The squared distance at which a singular kernel has its average over a sample's disc.
 HWY_INLINE VF disc_distance2(const KernelTables& kernel, VF r2, VF area) {
@@ -124,132 +89,6 @@ void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3&
     add_list<true>(kernel, list, x, total);
   else
     add_list<false>(kernel, list, x, total);
-}
-
-// A vector of indices, the last one repeated, and which of them are new.
-struct Batch {
-  hn::Vec<U> index;
-  hn::Mask<F> valid;
-};
-HWY_INLINE Batch load_batch(const std::uint32_t* indices, std::size_t i, std::size_t count) {
-  const F df;
-  const U du;
-  const std::size_t lanes = hn::Lanes(df);
-  if (i + lanes <= count) return {hn::LoadU(du, indices + i), hn::FirstN(df, lanes)};
-  HWY_ALIGN std::uint32_t rest[HWY_MAX_BYTES / 4];
-  for (std::size_t k = 0; k < lanes; ++k) rest[k] = indices[std::min(i + k, count - 1)];
-  return {hn::Load(du, rest), hn::FirstN(df, count - i)};
-}
-
-// Gathers one field of structures of floats at a time.
-struct Fields {
-  const float* first;
-  VI offset;
-  HWY_INLINE VF operator()(int field) const { return hn::GatherIndex(F(), first + field, offset); }
-};
-template <class Struct>
-HWY_INLINE Fields gather(const Struct* structs, hn::Vec<U> index) {
-  const I di;
-  return {reinterpret_cast<const float*>(structs),
-          hn::Mul(hn::BitCast(di, index),
-                  hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
-}
-// The fields of a SumNode, float by float.
-enum NodeField {
-  kNodeX,
-  kNodeY,
-  kNodeZ,
-  kNodeRadius,
-  kNodeSpread,
-  kNodeLean,
-  kNodeFirst,
-  kNodeCounts,
-  kNodePower,
-  kNodeXX = 12,
-  kNodeYY,
-  kNodeZZ,
-  kNodeYZ,
-  kNodeZX,
-  kNodeXY,
-  kNodeTint
-};
-// And of a SumSource.
-enum SourceField { kSourceX, kSourceY, kSourceZ, kSourceArea, kSourcePower };
-
-HWY_INLINE void append(IndexList& list, std::uint32_t* room, hn::Vec<U> index, hn::Mask<F> mask) {
-  const U du;
-  list.grow(hn::CompressStore(index, hn::RebindMask(du, mask), du, room));
-}
-
-void sort_nodes(const NodeTest& test, SortedNodes& lists) {
-  const F df;
-  const std::size_t lanes = hn::Lanes(df), count = lists.work.size();
-  const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
-  for (std::size_t i = 0; i < count; i += lanes) {
-    const Batch batch = load_batch(lists.work.data(), i, count);
-    const Fields node = gather(test.nodes, batch.index);
-    const VF r2 = length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz));
-    const VF radius = node(kNodeRadius), spread = node(kNodeSpread);
-    // From the point of the target that is nearest to the node.
-    const VF to_centre = hn::Sub(hn::Sqrt(r2), hn::Set(df, test.radius));
-    const VF to_rim = hn::Sub(to_centre, radius);
-    const VF near = test.certified ? to_rim : to_centre;
-    const VI bin = find_cell(test.bins, hn::Mul(near, near));
-    const VI row = hn::ShiftLeft<2>(bin);
-    const auto limit = [&](Limit which, VI at)
-                           HWY_ATTR { return hn::GatherIndex(df, test.limits + which, at); };
-    const VF lean = node(kNodeLean), to_lean = limit(kLean, row), to_bend = limit(kBend, row);
-    // In a series, as a point.
-    const VF moments = hn::MulAdd(hn::Set(df, test.third), radius, hn::Set(df, test.reach));
-    const VF series_error =
-        hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(node(kNodeTint), to_bend)));
-    const VF point_error = hn::MulAdd(spread, to_bend, hn::Mul(lean, to_lean));
-    const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
-    auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
-    apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
-    const auto far = hn::And(apart, hn::Le(series_error, limit(kInSeries, row)));
-    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, limit(kAsPoint, row))));
-    const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
-    const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
-    const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
-                                   hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
-    const auto near_rest = hn::AndNot(scattered, rest);
-    const auto opened =
-        test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
-    append(lists.scattered, lists.scattered.room(lanes), batch.index, scattered);
-    append(lists.far, lists.far.room(lanes), batch.index, far);
-    append(lists.points, lists.points.room(lanes), batch.index, point);
-    append(lists.opened, lists.opened.room(lanes), batch.index, opened);
-    if (!test.open_small)
-      append(lists.pending, lists.pending.room(lanes), batch.index, hn::AndNot(opened, near_rest));
-  }
-}
-
-void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
-  const F df;
-  const std::size_t lanes = hn::Lanes(df), count = lists.samples.size();
-  const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
-  for (std::size_t i = 0; i < count; i += lanes) {
-    const Batch batch = load_batch(lists.samples.data(), i, count);
-    const Fields source = gather(sources, batch.index);
-    const VF x = source(kSourceX), y = source(kSourceY), z = source(kSourceZ);
-    const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
-    const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
-    const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
-    const auto far =
-        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
-                hn::Ge(hn::GatherIndex(df, test.limits + kInSeries, hn::ShiftLeft<2>(bin)), hn::Zero(df)));
-    append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
-    near.reserve(lanes);
-    const auto here = hn::AndNot(far, batch.valid);
-    const VF values[] = {x, y, z, source(kSourceArea)};
-    for (int f = 0; f < SourceList::kFieldCount; ++f)
-      hn::CompressStore(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
-    HWY_ALIGN std::uint32_t which[hn::MaxLanes(df)];
-    const std::size_t taken = hn::CompressStore(batch.index, hn::RebindMask(U(), here), U(), which);
-    for (std::size_t k = 0; k < taken; ++k) near.powers()[near.size() + k] = sources[which[k]].power;
-    near.grow(taken);
-  }
 }
 
 template <bool kInterpolated, class Struct>
@@ -385,70 +224,21 @@ std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, S
                              : add_nodes<false>(kernel, test, lists, total);
 }
 
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
-  const F df;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
-    VF point = hn::Set(df, 3e38f), series = point;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const VF allowed =
-          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_third[k] + i));
-      point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, tables.as_point[k] + i)));
-      series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
-    }
-    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), hn::LoadU(df, tables.bend + i), point, series, df,
-                          limits + kLimitCount * i);
-  }
-}
-
 }  // namespace nacre::lanes::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace nacre {
-
-// Floats in the longest vector of any target.
-constexpr std::size_t kLongest = 64;
-
-void SourceList::reserve(std::size_t count) {
-  if (powers_.size() >= size_ + count + kLongest) return;
-  for (auto& field : fields_) field.resize(2 * (size_ + count + kLongest));
-  powers_.resize(2 * (size_ + count + kLongest));
-}
-
-void SourceList::add(std::span<const SumSource> sources) {
-  reserve(sources.size());
-  for (const SumSource& s : sources) {
-    const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area};
-    for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
-    powers_[size_] = s.power;
-    ++size_;
-  }
-}
-
-void SourceList::pad() {
-  if (size_ == 0) return;
-  reserve(0);
-  for (std::size_t i = 0; i < kLongest; ++i) {
-    for (auto& field : fields_) field[size_ + i] = field[size_ - 1];
-    powers_[size_ + i] = broadcast(0);
-  }
-}
-
-namespace lanes {
+namespace nacre::lanes {
 
 HWY_EXPORT(add_sources);
-HWY_EXPORT(sort_nodes);
-HWY_EXPORT(sort_samples);
 HWY_EXPORT(add_node_series);
 HWY_EXPORT(add_sample_series);
 HWY_EXPORT(add_coarsely);
-HWY_EXPORT(make_limits);
 
 void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
                  std::array<double, 3>& total) {
   HWY_DYNAMIC_DISPATCH(add_sources)(kernel, list, x, total);
 }
-void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH(sort_nodes)(test, lists); }
 void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                 const Vec3& centre, LocalExpansion& expansion) {
   HWY_DYNAMIC_DISPATCH(add_node_series)(kernel, nodes, far, centre, expansion);
@@ -457,17 +247,10 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
                 const Vec3& centre, LocalExpansion& expansion) {
   HWY_DYNAMIC_DISPATCH(add_sample_series)(kernel, sources, far, centre, expansion);
 }
-void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
-  HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
-}
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total) {
   return HWY_DYNAMIC_DISPATCH(add_coarsely)(kernel, test, lists, total);
 }
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
-  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, limits);
-}
 
-}  // namespace lanes
-}  // namespace nacre
+}  // namespace nacre::lanes
 #endif

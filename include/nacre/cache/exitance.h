@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "nacre/base/large_array.h"
 #include "nacre/cache/cache.h"
 #include "nacre/cache/kernel.h"
 #include "nacre/optics/medium.h"
@@ -65,8 +66,9 @@ class Exitance {
   static constexpr int kWholeLevel = 3;
 
  private:
-  static constexpr double kCellSpacings = 0.75;  // side of the smallest cells
-  static constexpr int kBlockLevels = 5;         // a block has 32 of them along each side
+  // Least side of the smallest cells in distances of samples, in mean free paths.
+  static constexpr double kCellSpacings = 0.75, kCellLengths = 0.4;
+  static constexpr int kBlockLevels = 5;  // a block has 32 of them along each side
   // Cells that are divided no further, for points about as dense as samples.
   static constexpr int kLeafLevel = 1;
   // Certified, a node is accepted if its radius is at most this share of its distance: all that larger ones
@@ -88,6 +90,7 @@ class Exitance {
   struct Room;
 
   struct Moments;
+  void copy_sources();
   void make_nodes();
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                       std::span<const Moments> moments);
@@ -101,13 +104,15 @@ class Exitance {
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
 
   const CacheGroup& group_;
-  std::vector<SumSource> sources_;
-  std::vector<SumNode> nodes_;
+  LargeArray<SumSource> sources_;
+  LargeArray<SumNode> nodes_;
   Kernel kernel_;
   Promise promise_;
   double allowance_;
-  float moment_slack_ = 1e-6f;  // what rounding and tables may take from second moments
+  float moment_slack_ = 1e-5f;  // what rounding and tables may take from second moments
   float nearest_ = 0;           // distance within which samples are summed one by one
+  Box3 box_;                    // of the samples
+  double spacing_ = 1;          // distance of samples
   Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1, cells_per_unit_ = 1;
   DistanceBins bins_{};

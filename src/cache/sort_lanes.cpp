@@ -1,0 +1,152 @@
+// Which nodes and samples go where, for every vector instruction set, chosen at run time.
+#include <algorithm>
+
+#include "cache/sum_lanes.h"
+
+#define HWY_COMPILE_ALL_ATTAINABLE  // the plain one, too
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "cache/sort_lanes.cpp"
+#include <hwy/foreach_target.h>
+
+#include "cache/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nacre::lanes::HWY_NAMESPACE {
+
+void sort_nodes(const NodeTest& test, SortedNodes& lists) {
+  const F df;
+  const std::size_t lanes = hn::Lanes(df), count = lists.work.size();
+  const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
+  for (std::size_t i = 0; i < count; i += lanes) {
+    const Batch batch = load_batch(lists.work.data(), i, count);
+    const Fields node = gather(test.nodes, batch.index);
+    const VF r2 = length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz));
+    const VF radius = node(kNodeRadius), spread = node(kNodeSpread);
+    // From the point of the target that is nearest to the node.
+    const VF to_centre = hn::Sub(hn::Sqrt(r2), hn::Set(df, test.radius));
+    const VF to_rim = hn::Sub(to_centre, radius);
+    const VF near = test.certified ? to_rim : to_centre;
+    const VI bin = find_cell(test.bins, hn::Mul(near, near));
+    const VI row = hn::ShiftLeft<2>(bin);
+    const auto limit = [&](Limit which, VI at)
+                           HWY_ATTR { return hn::GatherIndex(df, test.limits + which, at); };
+    const VF lean = node(kNodeLean), to_lean = limit(kLean, row), to_bend = limit(kBend, row);
+    // In a series, as a point.
+    const VF moments = hn::MulAdd(hn::Set(df, test.third), radius, hn::Set(df, test.reach));
+    const VF series_error =
+        hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(node(kNodeTint), to_bend)));
+    const VF point_error = hn::MulAdd(spread, to_bend, hn::Mul(lean, to_lean));
+    const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
+    auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
+    apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
+    const auto far = hn::And(apart, hn::Le(series_error, limit(kInSeries, row)));
+    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, limit(kAsPoint, row))));
+    const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
+    const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
+    const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
+                                   hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
+    const auto near_rest = hn::AndNot(scattered, rest);
+    const auto opened =
+        test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
+    append(lists.scattered, lists.scattered.room(lanes), batch.index, scattered);
+    append(lists.far, lists.far.room(lanes), batch.index, far);
+    append(lists.points, lists.points.room(lanes), batch.index, point);
+    append(lists.opened, lists.opened.room(lanes), batch.index, opened);
+    if (!test.open_small)
+      append(lists.pending, lists.pending.room(lanes), batch.index, hn::AndNot(opened, near_rest));
+  }
+}
+
+void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
+  const F df;
+  const std::size_t lanes = hn::Lanes(df), count = lists.samples.size();
+  const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
+  for (std::size_t i = 0; i < count; i += lanes) {
+    const Batch batch = load_batch(lists.samples.data(), i, count);
+    const Fields source = gather(sources, batch.index);
+    const VF x = source(kSourceX), y = source(kSourceY), z = source(kSourceZ);
+    const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
+    const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
+    const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
+    const auto far =
+        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
+                hn::Ge(hn::GatherIndex(df, test.limits + kInSeries, hn::ShiftLeft<2>(bin)), hn::Zero(df)));
+    append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
+    near.reserve(lanes);
+    const auto here = hn::AndNot(far, batch.valid);
+    const VF values[] = {x, y, z, source(kSourceArea)};
+    for (int f = 0; f < SourceList::kFieldCount; ++f)
+      hn::CompressStore(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
+    HWY_ALIGN std::uint32_t which[hn::MaxLanes(df)];
+    const std::size_t taken = hn::CompressStore(batch.index, hn::RebindMask(U(), here), U(), which);
+    for (std::size_t k = 0; k < taken; ++k) near.powers()[near.size() + k] = sources[which[k]].power;
+    near.grow(taken);
+  }
+}
+
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
+  const F df;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
+    VF point = hn::Set(df, 3e38f), series = point;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const VF allowed =
+          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_third[k] + i));
+      point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, tables.as_point[k] + i)));
+      series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
+    }
+    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), hn::LoadU(df, tables.bend + i), point, series, df,
+                          limits + kLimitCount * i);
+  }
+}
+
+}  // namespace nacre::lanes::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nacre {
+
+// Floats in the longest vector of any target.
+constexpr std::size_t kLongest = 64;
+
+void SourceList::reserve(std::size_t count) {
+  if (powers_.size() >= size_ + count + kLongest) return;
+  for (auto& field : fields_) field.resize(2 * (size_ + count + kLongest));
+  powers_.resize(2 * (size_ + count + kLongest));
+}
+
+void SourceList::add(std::span<const SumSource> sources) {
+  reserve(sources.size());
+  for (const SumSource& s : sources) {
+    const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area};
+    for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
+    powers_[size_] = s.power;
+    ++size_;
+  }
+}
+
+void SourceList::pad() {
+  if (size_ == 0) return;
+  reserve(0);
+  for (std::size_t i = 0; i < kLongest; ++i) {
+    for (auto& field : fields_) field[size_ + i] = field[size_ - 1];
+    powers_[size_ + i] = broadcast(0);
+  }
+}
+
+namespace lanes {
+
+HWY_EXPORT(sort_nodes);
+HWY_EXPORT(sort_samples);
+HWY_EXPORT(make_limits);
+
+void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH(sort_nodes)(test, lists); }
+void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
+  HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
+}
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
+  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, limits);
+}
+
+}  // namespace lanes
+}  // namespace nacre
+#endif
