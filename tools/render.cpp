@@ -170,7 +170,8 @@ void check_combination(const Options& options) {
     throw UsageError("--exitance keeps what --method hierarchical interpolates, without --certified");
   if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
-  if (options.tolerance && !(*options.tolerance >= 0)) throw UsageError("--tolerance is a number from 0 to 1, not nan");
+  if (options.tolerance && !(*options.tolerance >= 0))
+    throw UsageError("--tolerance is a number from 0 to 1, not nan");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
     throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
 }

@@ -34,7 +34,7 @@ HWY_INLINE Float4 mul_add(Float4 a, Float4 b, Float4 c) {
 #endif
 }
 
-// Where a distance lies in a table: the cell times `stride`, and the fraction of it.
+// Where a distance lies in a table: the cell, and the fraction of it.
 HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
   const I di;
   const VI cell = hn::ShiftRightSame(hn::BitCast(di, r2), bins.shift);
