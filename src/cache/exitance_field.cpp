@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "cache/patch_split.h"
 #include "nacre/base/parallel.h"
@@ -14,53 +15,75 @@ namespace nacre {
 namespace {
 
 enum BlockState : std::uint8_t { kEmpty, kBusy, kFull };
-enum PatchState : std::uint8_t { kUnknown, kSmooth, kSteep };
 
 // A patch over which M_o bends by more than this share of itself, or changes so much along an edge, may err
 // by more than the tolerance: light there is as narrow as a mean free path.
 constexpr float kMostBend = 0.08f, kMostChange = 0.4f;
 
+Rgb to_rgb(Float4 v) noexcept { return {v[0], v[1], v[2]}; }
+Float4 larger(Float4 a, Float4 b) noexcept { return a > b ? a : b; }
+Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
+
+// Values at the nodes of a part that is known may be read.
+template <class Part>
+std::uint32_t mark_of(Part& part) noexcept {
+  return std::atomic_ref(part.mark).load(std::memory_order_acquire);
+}
+
+// Filters out most of what was asked for before.
+class Recent {
+ public:
+  Recent() { slots_.fill(0xffffffffu); }
+  bool is_new(std::uint32_t index) noexcept {
+    std::uint32_t& slot = slots_[index % slots_.size()];
+    return std::exchange(slot, index) != index;
+  }
+
+ private:
+  std::array<std::uint32_t, 1024> slots_;
+};
+
 }  // namespace
 
-// The patch that a hit lies in, and its weights there.
+// The part that a hit lies in and that is not divided, and its weights there.
 std::uint32_t ExitanceField::find_patch(const Hit& hit, float& u, float& v) const noexcept {
   u = hit.u;
   v = hit.v;
-  std::uint32_t part = parts_[first_triangle_[hit.mesh] + hit.triangle];
-  while (part & kSplitBit) {
-    const Split& split = splits_[part & ~kSplitBit];
-    part = parts_[split.first + find_part(split.pattern, u, v)];
-  }
-  return part;
+  std::uint32_t index = first_triangle_[hit.mesh] + hit.triangle;
+  while (parts_[index].mark & kDivided)
+    index = parts_[index].data[0] + find_part(parts_[index].data[1], u, v);
+  return index;
 }
 
-ExitanceField::Patch ExitanceField::patch(std::uint32_t index) const noexcept {
-  if (index >= corners_.size()) return patches_[index - corners_.size()];
-  const auto& t = corners_[index];
-  return {{t[0], t[1], t[2], kNone, kNone, kNone}};
+ExitanceField::Patch ExitanceField::patch(const Part& part) const noexcept {
+  const auto& t = part.data;
+  return part.mark & kCurved ? patches_[t[0]] : Patch{{t[0], t[1], t[2], kNone, kNone, kNone}};
 }
 
-void ExitanceField::fetch_nodes(std::uint32_t index) const noexcept {
-  if (index < corners_.size()) {
-    for (const std::uint32_t node : corners_[index]) __builtin_prefetch(&values_[node]);
+void ExitanceField::fetch_nodes(const Part& part) const noexcept {
+  if (!(part.mark & kCurved)) {
+    for (const std::uint32_t node : part.data) __builtin_prefetch(&values_[node]);
   } else {
-    for (const std::uint32_t node : patches_[index - corners_.size()].nodes)
+    for (const std::uint32_t node : patches_[part.data[0]].nodes)
       __builtin_prefetch(&values_[node != kNone ? node : 0]);
   }
+}
+
+void ExitanceField::set_value(std::uint32_t node, const Rgb& value) const noexcept {
+  values_[node] = Float4{value.x, value.y, value.z, 0};
 }
 
 // Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.
 void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const {
   std::vector<Vec3> positions;
   for (const std::uint32_t block : blocks)
-    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
-      positions.push_back(positions_[block_nodes_[i]]);
+    positions.insert(positions.end(), positions_.begin() + block_begin_[block],
+                     positions_.begin() + block_begin_[block + 1]);
   std::vector<Rgb> values(positions.size());
   exitance_.eval_whole(positions, values, evaluations);
   auto value = values.begin();
   for (const std::uint32_t block : blocks) {
-    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
-      values_[block_nodes_[i]] = *value++;
+    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i) set_value(i, *value++);
     block_state_[block].store(kFull, std::memory_order_release);
     block_state_[block].notify_all();
   }
@@ -91,8 +114,9 @@ void ExitanceField::fill(std::uint64_t& evaluations) const {
     sum += own;
   });
   evaluations += sum;
-  parallel_for(corners_.size() + patches_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) judge(static_cast<std::uint32_t>(i));
+  parallel_for(parts_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (!(parts_[i].mark & kDivided)) judge(parts_[i]);
   });
 }
 
@@ -106,7 +130,7 @@ KeptExitance ExitanceField::keep() const {
     if (block_state_[block].load(std::memory_order_acquire) != kFull) continue;
     kept.filled[block] = 1;
     for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
-      kept.values[block_nodes_[i]] = values_[block_nodes_[i]];
+      kept.values[i] = to_rgb(values_[i]);
   }
   return kept;
 }
@@ -115,7 +139,7 @@ void ExitanceField::restore(const KeptExitance& kept) const {
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {
     if (!kept.filled[block]) continue;
     for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
-      values_[block_nodes_[i]] = kept.values[block_nodes_[i]];
+      set_value(i, kept.values[i]);
     block_state_[block].store(kFull, std::memory_order_release);
   }
 }
@@ -129,91 +153,89 @@ std::size_t ExitanceField::filled_node_count() const {
 }
 
 // Once its nodes are known, whether a patch may be interpolated.
-void ExitanceField::judge(std::uint32_t index) const noexcept {
-  patch_state_[index].store(is_steep(patch(index)) ? kSteep : kSmooth, std::memory_order_release);
+void ExitanceField::judge(Part& part) const noexcept {
+  const std::uint32_t kind = std::atomic_ref(part.mark).load(std::memory_order_relaxed) & ~kKnown;
+  std::atomic_ref(part.mark).store(kind | (is_steep(patch(part)) ? kSteep : kSmooth),
+                                   std::memory_order_release);
 }
 
 bool ExitanceField::is_steep(const Patch& patch) const noexcept {
+  const auto exceeds = [](Float4 x, Float4 most) {
+    return x[0] > most[0] || x[1] > most[1] || x[2] > most[2];
+  };
   for (std::size_t i = 0; i < 3; ++i) {
-    const Rgb &a = values_[patch.nodes[i]], &b = values_[patch.nodes[(i + 1) % 3]];
-    const Rgb mean = (a + b) * 0.5f;
-    const bool bends = patch.nodes[3 + i] != kNone;
-    const Rgb bend = bends ? values_[patch.nodes[3 + i]] - mean : Rgb(0, 0, 0);
-    for (int k = 0; k < 3; ++k) {
-      const float size = bends ? std::max(mean[k], values_[patch.nodes[3 + i]][k]) : mean[k];
-      if (std::abs(bend[k]) > kMostBend * size || (!bends && std::abs(a[k] - b[k]) > kMostChange * size))
-        return true;
+    const Float4 a = values_[patch.nodes[i]], b = values_[patch.nodes[(i + 1) % 3]];
+    const Float4 mean = (a + b) * broadcast(0.5f);
+    if (patch.nodes[3 + i] == kNone) {
+      if (exceeds(magnitude(a - b), mean * broadcast(kMostChange))) return true;
+    } else {
+      const Float4 middle = values_[patch.nodes[3 + i]];
+      if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(kMostBend))) return true;
     }
   }
   return false;
 }
 
-Rgb ExitanceField::interpolate(const Patch& patch, float u, float v) const noexcept {
+Float4 ExitanceField::interpolate(const Patch& patch, float u, float v) const noexcept {
   const float w = 1 - u - v;
-  const Rgb &a = values_[patch.nodes[0]], &b = values_[patch.nodes[1]], &c = values_[patch.nodes[2]];
-  Rgb value = a * w + b * u + c * v;
-  const std::array<float, 3> bumps{4 * w * u, 4 * u * v, 4 * v * w};
-  const std::array<const Rgb*, 4> corners{&a, &b, &c, &a};
-  for (std::size_t i = 0; i < 3; ++i)
-    if (patch.nodes[3 + i] != kNone)
-      value += (values_[patch.nodes[3 + i]] - (*corners[i] + *corners[i + 1]) * 0.5f) * bumps[i];
-  // A parabola may undershoot where light ends.
-  return {std::max(value.x, 0.0f), std::max(value.y, 0.0f), std::max(value.z, 0.0f)};
+  const Float4 a = values_[patch.nodes[0]], b = values_[patch.nodes[1]], c = values_[patch.nodes[2]];
+  Float4 value = a * broadcast(w) + b * broadcast(u) + c * broadcast(v);
+  const auto bend = [&](std::size_t middle, Float4 from, Float4 to, float bump) {
+    if (patch.nodes[middle] != kNone)
+      value += (values_[patch.nodes[middle]] - (from + to) * broadcast(0.5f)) * broadcast(bump);
+  };
+  bend(3, a, b, 4 * w * u);
+  bend(4, b, c, 4 * u * v);
+  bend(5, c, a, 4 * v * w);
+  return larger(value, broadcast(0));  // a parabola may undershoot where light ends
 }
 
 void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
                          std::uint64_t& evaluations) const {
   struct Place {
-    std::uint32_t patch;
+    std::uint32_t part;
     float u, v;
   };
-  // What a value is made of lies all over the memory: a few hits together fetch it while others are at work.
-  constexpr std::size_t kTogether = 32;
+  // What a value is made of lies all over the memory: it is fetched while hits before are at work.
+  constexpr std::size_t kAhead = 32;
   std::vector<Place> places(hits.size());
-  std::vector<std::uint32_t> missing, blocks;
+  std::vector<std::uint32_t> missing, blocks, steep;
+  Recent recent_parts, recent_blocks;
   for (std::size_t i = 0; i < hits.size(); ++i) {
-    const Hit& ahead = hits[std::min(i + kTogether, hits.size() - 1)];
+    const Hit& ahead = hits[std::min(i + kAhead, hits.size() - 1)];
     __builtin_prefetch(&parts_[first_triangle_[ahead.mesh] + ahead.triangle]);
-    places[i].patch = find_patch(hits[i], places[i].u, places[i].v);
-    const std::uint32_t patch = places[i].patch;
-    __builtin_prefetch(&patch_state_[patch]);
-    if (patch < corners_.size())
-      __builtin_prefetch(&corners_[patch]);
-    else
-      __builtin_prefetch(&patches_[patch - corners_.size()]);
+    Place& place = places[i];
+    place.part = find_patch(hits[i], place.u, place.v);
+    if (!(mark_of(parts_[place.part]) & kKnown) && recent_parts.is_new(place.part))
+      missing.push_back(place.part);
   }
-  for (const Place& place : places)
-    if (!patch_state_[place.patch].load(std::memory_order_acquire)) missing.push_back(place.patch);
   if (!missing.empty()) {
-    std::sort(missing.begin(), missing.end());
-    missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
     for (const std::uint32_t index : missing)
-      for (const std::uint32_t node : patch(index).nodes)
-        if (node != kNone && block_state_[block_of_[node]].load(std::memory_order_acquire) != kFull)
+      for (const std::uint32_t node : patch(parts_[index]).nodes)
+        if (node != kNone && recent_blocks.is_new(block_of_[node]) &&
+            block_state_[block_of_[node]].load(std::memory_order_acquire) != kFull)
           blocks.push_back(block_of_[node]);
     std::sort(blocks.begin(), blocks.end());
     blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     await_blocks(blocks, evaluations);
     for (std::size_t i = 0; i < missing.size(); ++i) {
-      fetch_nodes(missing[std::min(i + kTogether, missing.size() - 1)]);
-      judge(missing[i]);
+      fetch_nodes(parts_[missing[std::min(i + kAhead, missing.size() - 1)]]);
+      judge(parts_[missing[i]]);
     }
   }
-  std::vector<std::uint32_t> steep;
-  for (std::size_t begin = 0; begin < hits.size(); begin += kTogether) {
-    const std::size_t end = std::min(begin + kTogether, hits.size());
-    for (std::size_t i = begin; i < end; ++i) fetch_nodes(places[i].patch);
-    for (std::size_t i = begin; i < end; ++i) {
-      const Place& place = places[i];
-      if (patch_state_[place.patch].load(std::memory_order_acquire) == kSteep) {
-        steep.push_back(static_cast<std::uint32_t>(i));
-      } else if (place.patch < corners_.size()) {
-        const auto& [a, b, c] = corners_[place.patch];
-        exitance[i] = values_[a] * (1 - place.u - place.v) + values_[b] * place.u + values_[c] * place.v;
-      } else {
-        exitance[i] = interpolate(patches_[place.patch - corners_.size()], place.u, place.v);
-      }
-    }
+  for (std::size_t i = 0; i < std::min(kAhead, hits.size()); ++i) fetch_nodes(parts_[places[i].part]);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    fetch_nodes(parts_[places[std::min(i + kAhead, hits.size() - 1)].part]);
+    const auto& [index, u, v] = places[i];
+    const std::uint32_t mark = mark_of(parts_[index]);
+    const auto& [a, b, c] = parts_[index].data;
+    if (mark & kSteep)
+      steep.push_back(static_cast<std::uint32_t>(i));
+    else if (mark & kCurved)
+      exitance[i] = to_rgb(interpolate(patches_[a], u, v));
+    else
+      exitance[i] =
+          to_rgb(values_[a] * broadcast(1 - u - v) + values_[b] * broadcast(u) + values_[c] * broadcast(v));
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;

@@ -66,14 +66,17 @@ struct HashCode {
 
 }  // namespace
 
-// What a run of triangles is divided into; nodes from `vertices` on, patches, splits and parts are numbered
-// within the run.
+// What a run of triangles of one mesh is divided into. Nodes from the number of vertices on, patches and
+// parts of parts are numbered within the run.
 struct ExitanceField::Division {
-  std::size_t begin, end;  // triangles
-  std::vector<std::uint32_t> parts, parts_of_splits;
+  std::size_t mesh, begin, end;
+  std::vector<std::uint32_t> triangles;  // those that are more than their corners,
+  std::vector<Part> wholes;              // what they are,
+  std::vector<Part> parts;               // and theirs
   std::vector<Patch> patches;
-  std::vector<Split> splits;
   std::vector<Vec3> positions;
+  std::vector<std::uint32_t> numbers;  // of those nodes in the field
+  std::size_t first_part, first_patch;
 };
 
 // Divides triangles until no edge is too long.
@@ -84,13 +87,13 @@ class ExitanceField::Divider {
         longest2_(static_cast<float>(square(distance))),
         straight2_(straight_edge2(distance)),
         into_(into),
-        extras_(2 * (into.end - into.begin)) {}
+        extras_(64) {}
 
-  // The part for triangle `index` with these corners.
-  std::uint32_t divide_triangle(std::uint32_t index, const Triangle& t) {
-    float longest2 = 0;
-    for (std::size_t i = 0; i < 3; ++i) longest2 = std::max(longest2, length2(t[i], t[(i + 1) % 3]));
-    return longest2 > straight2_ ? divide(t, 0) : index;
+  void divide_triangle(std::size_t index, const Triangle& t) {
+    const Part whole = divide(t, 0);
+    if (whole.mark == 0) return;
+    into_.triangles.push_back(static_cast<std::uint32_t>(index));
+    into_.wholes.push_back(whole);
   }
   void end() { into_.positions = extras_.keys(); }
 
@@ -104,8 +107,7 @@ class ExitanceField::Divider {
     return static_cast<std::uint32_t>(vertices_.size()) + extras_.find_or_add((at(a) + at(b)) * 0.5f);
   }
 
-  // Patches are numbered from kWhole on, below are triangles that need no division.
-  std::uint32_t divide(const Triangle& t, int depth) {
+  Part divide(const Triangle& t, int depth) {
     std::array<float, 3> edges2;
     for (std::size_t i = 0; i < 3; ++i) edges2[i] = length2(t[i], t[(i + 1) % 3]);
     // Coordinates too coarse for the distance of nodes have no middle between them.
@@ -113,13 +115,14 @@ class ExitanceField::Divider {
     const auto is_long = [&](std::size_t i) { return edges2[i] > longest2_ && depth < kDeepest; };
     const int count = is_long(0) + is_long(1) + is_long(2);
     if (count == 0) {
+      if (std::max({edges2[0], edges2[1], edges2[2]}) <= straight2_) return {{t[0], t[1], t[2]}, 0};
       Patch patch;
       for (std::size_t i = 0; i < 3; ++i) {
         patch.nodes[i] = t[i];
         patch.nodes[3 + i] = edges2[i] > straight2_ ? middle(t[i], t[(i + 1) % 3]) : kNone;
       }
       into_.patches.push_back(patch);
-      return kPatchBit | static_cast<std::uint32_t>(into_.patches.size() - 1);
+      return {{static_cast<std::uint32_t>(into_.patches.size() - 1), 0, 0}, kCurved};
     }
     std::uint32_t turn = 0;
     if (count == 1)
@@ -144,14 +147,11 @@ class ExitanceField::Divider {
       pieces = {{{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {bc, ca, ab}}};
     }
     pattern |= turn << kTurnShift;
-    const auto split = static_cast<std::uint32_t>(into_.splits.size());
-    into_.splits.push_back({});
-    std::array<std::uint32_t, 4> made{};
+    std::array<Part, 4> made;
     for (std::uint32_t i = 0; i < part_count(pattern); ++i) made[i] = divide(pieces[i], depth + 1);
-    into_.splits[split] = {static_cast<std::uint32_t>(into_.parts_of_splits.size()), pattern};
-    into_.parts_of_splits.insert(into_.parts_of_splits.end(), made.begin(),
-                                 made.begin() + part_count(pattern));
-    return kSplitBit | split;
+    const auto first = static_cast<std::uint32_t>(into_.parts.size());
+    into_.parts.insert(into_.parts.end(), made.begin(), made.begin() + part_count(pattern));
+    return {{first, pattern, 0}, kDivided};
   }
 
   std::span<const Vec3> vertices_;
@@ -187,74 +187,95 @@ double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double 
 
 ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance)
     : exitance_(exitance), meshes_(std::move(meshes)) {
-  std::size_t triangles = 0, vertices = 0;
-  for (const Mesh* const mesh : meshes_) {
-    first_triangle_.push_back(static_cast<std::uint32_t>(triangles));
-    if (mesh) triangles += mesh->triangles.size(), vertices += mesh->positions.size();
-  }
-  corners_.resize(triangles);
+  std::size_t vertices = 0;
+  for (const Mesh* const mesh : meshes_)
+    if (mesh) vertices += mesh->positions.size();
   positions_.reserve(2 * vertices);
-  for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (!meshes_[m]) continue;
-    const auto first = static_cast<std::uint32_t>(positions_.size());
-    positions_.insert(positions_.end(), meshes_[m]->positions.begin(), meshes_[m]->positions.end());
-    const std::vector<Triangle>& from = meshes_[m]->triangles;
-    parallel_for(from.size(), kRun, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        corners_[first_triangle_[m] + i] = {first + from[i][0], first + from[i][1], first + from[i][2]};
-    });
-  }
   divide_meshes(distance);
-  make_blocks();
-  values_.resize(positions_.size());
+  values_ = LargeArray<Float4>(positions_.size());
   block_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(block_begin_.size());
-  patch_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(corners_.size() + patches_.size());
 }
 
 void ExitanceField::divide_meshes(double distance) {
-  std::vector<Division> runs((corners_.size() + kRun - 1) / kRun);
+  std::vector<Division> runs;
+  std::vector<std::uint32_t> first_vertex;
+  std::size_t triangles = 0;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    first_triangle_.push_back(static_cast<std::uint32_t>(triangles));
+    first_vertex.push_back(static_cast<std::uint32_t>(positions_.size()));
+    if (!meshes_[m]) continue;
+    positions_.insert(positions_.end(), meshes_[m]->positions.begin(), meshes_[m]->positions.end());
+    const std::size_t count = meshes_[m]->triangles.size();
+    triangles += count;
+    for (std::size_t begin = 0; begin < count; begin += kRun) {
+      Division& run = runs.emplace_back();
+      run.mesh = m;
+      run.begin = begin;
+      run.end = std::min(begin + kRun, count);
+    }
+  }
+  const auto corners = [&](const Division& run, std::size_t triangle) -> Triangle {
+    const Triangle& t = meshes_[run.mesh]->triangles[triangle];
+    const std::uint32_t first = first_vertex[run.mesh];
+    return {first + t[0], first + t[1], first + t[2]};
+  };
   parallel_for(runs.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t r = first; r < last; ++r) {
-      Division& run = runs[r];
-      run.begin = r * kRun;
-      run.end = std::min(run.begin + kRun, corners_.size());
-      Divider divider(positions_, distance, run);
-      for (std::size_t i = run.begin; i < run.end; ++i)
-        run.parts.push_back(divider.divide_triangle(static_cast<std::uint32_t>(i), corners_[i]));
+      Divider divider(positions_, distance, runs[r]);
+      for (std::size_t i = runs[r].begin; i < runs[r].end; ++i)
+        divider.divide_triangle(i, corners(runs[r], i));
       divider.end();
     }
   });
   // One after the other, renumbered.
-  const auto vertices = static_cast<std::uint32_t>(positions_.size()),
-             triangles = static_cast<std::uint32_t>(corners_.size());
-  parts_.resize(triangles);
-  std::size_t extra_count = 0, patch_count = 0;
-  for (const Division& run : runs) extra_count += run.positions.size(), patch_count += run.patches.size();
-  Numbering<Vec3, HashPosition> extras(extra_count);
-  patches_.reserve(patch_count);
-  std::vector<std::uint32_t> numbers;
-  for (const Division& run : runs) {
-    numbers.clear();
-    for (const Vec3& p : run.positions) numbers.push_back(vertices + extras.find_or_add(p));
-    const auto patch = triangles + static_cast<std::uint32_t>(patches_.size()),
-               split = static_cast<std::uint32_t>(splits_.size()),
-               part = static_cast<std::uint32_t>(parts_.size());
-    const auto renumber = [&](std::uint32_t p) {
-      return p & kSplitBit ? p + split : p & kPatchBit ? (p & ~kPatchBit) + patch : p;
-    };
-    std::ranges::transform(run.parts, parts_.begin() + static_cast<std::ptrdiff_t>(run.begin), renumber);
-    std::ranges::transform(run.parts_of_splits, std::back_inserter(parts_), renumber);
-    for (Split s : run.splits) splits_.push_back({s.first + part, s.pattern});
-    for (Patch p : run.patches) {
-      for (std::uint32_t& node : p.nodes)
-        if (node != kNone && node >= vertices) node = numbers[node - vertices];
-      patches_.push_back(p);
-    }
+  const auto vertices = static_cast<std::uint32_t>(positions_.size());
+  std::size_t part_count = triangles, patch_count = 0, extra_count = 0;
+  for (Division& run : runs) {
+    run.first_part = part_count;
+    run.first_patch = patch_count;
+    part_count += run.parts.size();
+    patch_count += run.patches.size();
+    extra_count += run.positions.size();
   }
+  Numbering<Vec3, HashPosition> extras(extra_count);
+  for (Division& run : runs)
+    for (const Vec3& p : run.positions) run.numbers.push_back(vertices + extras.find_or_add(p));
   positions_.insert(positions_.end(), extras.keys().begin(), extras.keys().end());
+  const std::vector<std::uint32_t> places = sort_nodes();
+  parts_ = LargeArray<Part>(part_count);
+  patches_.resize(patch_count);
+  parallel_for(runs.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t r = first; r < last; ++r) place_run(runs[r], vertices, places, corners);
+  });
 }
 
-void ExitanceField::make_blocks() {
+// Puts a run where it belongs.
+template <class Corners>
+void ExitanceField::place_run(const Division& run, std::uint32_t vertices,
+                              std::span<const std::uint32_t> places, const Corners& corners) {
+  const auto renumber_node = [&](std::uint32_t& node) {
+    if (node != kNone) node = places[node < vertices ? node : run.numbers[node - vertices]];
+  };
+  const auto renumber = [&](Part part) {
+    if (part.mark == 0)
+      for (std::uint32_t& node : part.data) renumber_node(node);
+    else
+      part.data[0] += static_cast<std::uint32_t>(part.mark == kCurved ? run.first_patch : run.first_part);
+    return part;
+  };
+  Part* const own = &parts_[first_triangle_[run.mesh]];
+  for (std::size_t i = run.begin; i < run.end; ++i) own[i] = renumber({corners(run, i), 0});
+  for (std::size_t i = 0; i < run.triangles.size(); ++i) own[run.triangles[i]] = renumber(run.wholes[i]);
+  std::ranges::transform(run.parts, &parts_[run.first_part], renumber);
+  for (std::size_t i = 0; i < run.patches.size(); ++i) {
+    Patch patch = run.patches[i];
+    for (std::uint32_t& node : patch.nodes) renumber_node(node);
+    patches_[run.first_patch + i] = patch;
+  }
+}
+
+// Sorts nodes by the blocks of space that they are in; gives their places in the new order.
+std::vector<std::uint32_t> ExitanceField::sort_nodes() {
   std::vector<std::uint64_t> codes(positions_.size());
   parallel_for(codes.size(), kRun, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
@@ -278,9 +299,14 @@ void ExitanceField::make_blocks() {
     ++block_begin_[block_of_[i] + 1];
   }
   for (std::size_t i = 1; i < block_begin_.size(); ++i) block_begin_[i] += block_begin_[i - 1];
-  block_nodes_.resize(codes.size());
-  std::vector<std::uint32_t> next(block_begin_.begin(), block_begin_.end() - 1);
-  for (std::uint32_t i = 0; i < codes.size(); ++i) block_nodes_[next[block_of_[i]]++] = i;
+  std::vector<std::uint32_t> places(codes.size()), next(block_begin_.begin(), block_begin_.end() - 1);
+  for (std::uint32_t i = 0; i < codes.size(); ++i) places[i] = next[block_of_[i]]++;
+  std::vector<Vec3> positions(codes.size());
+  for (std::uint32_t i = 0; i < codes.size(); ++i) positions[places[i]] = positions_[i];
+  positions_.swap(positions);
+  for (std::uint32_t b = 0; b + 1 < block_begin_.size(); ++b)
+    std::fill(block_of_.begin() + block_begin_[b], block_of_.begin() + block_begin_[b + 1], b);
+  return places;
 }
 
 }  // namespace nacre

@@ -16,8 +16,14 @@ enum Pattern : std::uint32_t {
   kTurnShift = 2,  // then by how many vertices it was turned
 };
 
-// Marks of a part: a split, or a patch of a run that is being divided.
-constexpr std::uint32_t kSplitBit = 0x80000000u, kPatchBit = 0x40000000u;
+// Marks of a part: what it is, if not flat, and what is known of the values at its nodes.
+enum PartMark : std::uint32_t {
+  kSmooth = 1,
+  kSteep = 2,
+  kKnown = kSmooth | kSteep,
+  kCurved = 4,
+  kDivided = 8
+};
 
 inline std::uint32_t part_count(std::uint32_t pattern) {
   constexpr std::uint32_t kCounts[] = {2, 3, 3, 4};

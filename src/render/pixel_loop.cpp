@@ -48,11 +48,11 @@ PixelLoop::PixelLoop(const World& world, const std::vector<Translucency>& media,
   wave_limit_ = counts_mirrors_ ? std::min(depth_limit_, kMaxWaves) : kMaxDirectWaves;
 }
 
-void PixelLoop::render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const {
+void PixelLoop::render_tile(const Tile& tile, PixelBuffer& pixels, Totals& totals) const {
   std::vector<Path> paths, next;
   {
     const StageClock clock(totals.surface);
-    paths = start_paths(begin, end, pixels);
+    paths = start_paths(tile, pixels);
   }
   for (int wave = 0; wave < wave_limit_ && !paths.empty(); ++wave) {
     {
@@ -98,23 +98,28 @@ Hit PixelLoop::first_hit(std::uint32_t pixel) const {
   return world_.tracer.intersect(camera_sample(pixel_start(pixel), 0).ray);
 }
 
-std::vector<PixelLoop::Path> PixelLoop::start_paths(std::size_t begin, std::size_t end,
-                                                    PixelBuffer& pixels) const {
+std::vector<PixelLoop::Path> PixelLoop::start_paths(const Tile& tile, PixelBuffer& pixels) const {
   std::vector<Path> paths;
-  paths.reserve((end - begin) * static_cast<std::size_t>(params_.samples_per_pixel));
-  for (auto pixel = static_cast<std::uint32_t>(begin); pixel < end; ++pixel) {
-    const PixelStart start = pixel_start(pixel);
-    for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel); ++sample) {
-      const CameraSample seen = camera_sample(start, sample);
-      Path path;
-      path.ray.ray = seen.ray;
-      // Of a few samples the weights might hardly add up to anything.
-      const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : seen.weight;
-      path.throughput = Rgb(weight);
-      pixels.weight[pixel] += weight;
-      path.pixel = pixel;
-      path.sample = sample;
-      paths.push_back(path);
+  paths.reserve(static_cast<std::size_t>(tile.width * tile.height) *
+                static_cast<std::size_t>(params_.samples_per_pixel));
+  for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    for (int x = tile.x; x < tile.x + tile.width; ++x) {
+      const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(params_.crop_width) +
+                         static_cast<std::uint32_t>(x);
+      const PixelStart start = pixel_start(pixel);
+      for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(params_.samples_per_pixel);
+           ++sample) {
+        const CameraSample seen = camera_sample(start, sample);
+        Path path;
+        path.ray.ray = seen.ray;
+        // Of a few samples the weights might hardly add up to anything.
+        const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : seen.weight;
+        path.throughput = Rgb(weight);
+        pixels.weight[pixel] += weight;
+        path.pixel = pixel;
+        path.sample = sample;
+        paths.push_back(path);
+      }
     }
   }
   return paths;

@@ -1,4 +1,4 @@
-// Runs of pixels, each in waves of rays so that every stage is timed as a whole.
+// Tiles of pixels, each in waves of rays so that every stage is timed as a whole.
 #pragma once
 
 #include <atomic>
@@ -20,12 +20,17 @@ struct Totals {
   std::vector<std::atomic<std::uint64_t>> lost, taken;  // samples of single scattering, by medium
 };
 
+/// Pixels that are rendered together, from the corner of the rendered rectangle.
+struct Tile {
+  int x, y, width, height;
+};
+
 class PixelLoop {
  public:
   /// `media` are parallel to Scene::media. All have to outlive it.
   PixelLoop(const World& world, const std::vector<Translucency>& media, const RenderParams& params);
-  /// Adds the samples of pixels [begin, end) of the rendered rectangle, row by row.
-  void render_pixels(std::size_t begin, std::size_t end, PixelBuffer& pixels, Totals& totals) const;
+  /// Adds the samples of the pixels of a tile.
+  void render_tile(const Tile& tile, PixelBuffer& pixels, Totals& totals) const;
   /// What the first sample of a pixel sees.
   Hit first_hit(std::uint32_t pixel) const;
 
@@ -56,7 +61,7 @@ class PixelLoop {
   CameraSample camera_sample(const PixelStart& start, std::uint32_t sample) const;
   std::array<int, 2> place(std::uint32_t pixel) const;
   std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
-  std::vector<Path> start_paths(std::size_t begin, std::size_t end, PixelBuffer& pixels) const;
+  std::vector<Path> start_paths(const Tile& tile, PixelBuffer& pixels) const;
   void record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const;
   void add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const;
   void shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const;

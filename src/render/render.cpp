@@ -10,7 +10,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t kPathsPerTask = 1 << 14;
+constexpr int kPathsPerTile = 1 << 14;
 
 // Rays that are lost in closed objects, too: they met an edge or a vertex to the last bit.
 constexpr double kLostShare = 1e-6;
@@ -24,6 +24,17 @@ Warnings describe_lost_samples(const Scene& scene, const Totals& totals) {
           "its bounding box ended them: close its surface, or take the shading there as a guess",
           scene.media[m].place, totals.lost[m].load(), totals.taken[m].load(), medium_label(scene, m)));
   return warnings;
+}
+
+// Squares, in which neighbours find what others have brought near: triangles, nodes, texels.
+std::vector<Tile> make_tiles(const RenderParams& params) {
+  int edge = 1;
+  while (4 * edge * edge * params.samples_per_pixel <= kPathsPerTile) edge *= 2;
+  std::vector<Tile> tiles;
+  for (int y = 0; y < params.crop_height; y += edge)
+    for (int x = 0; x < params.crop_width; x += edge)
+      tiles.push_back({x, y, std::min(edge, params.crop_width - x), std::min(edge, params.crop_height - y)});
+  return tiles;
 }
 
 }  // namespace
@@ -87,15 +98,12 @@ Image Renderer::render(const RenderParams& params, Progress& progress, Report& r
   const PixelLoop loop(world_, media_, params);
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
-  const std::size_t per_task =
-      std::max<std::size_t>(1, kPathsPerTask / static_cast<std::size_t>(params.samples_per_pixel));
-  const std::size_t tasks = (pixel_count + per_task - 1) / per_task;
+  const std::vector<Tile> tiles = make_tiles(params);
   progress.begin("rendering", "pixels", pixel_count);
-  parallel_for(tasks, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t task = begin; task < end; ++task) {
-      const std::size_t first = task * per_task, last = std::min(first + per_task, pixel_count);
-      loop.render_pixels(first, last, pixels, totals);
-      progress.advance(last - first);
+  parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      loop.render_tile(tiles[i], pixels, totals);
+      progress.advance(static_cast<std::size_t>(tiles[i].width * tiles[i].height));
     }
   });
   progress.end();

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "nacre/base/large_array.h"
 #include "nacre/cache/exitance.h"
 #include "nacre/cache/exitance_file.h"
 #include "nacre/geometry/mesh.h"
@@ -56,37 +57,41 @@ class ExitanceField {
   struct Patch {
     std::array<std::uint32_t, 6> nodes;
   };
-  // A triangle that is divided further: `first` of its parts in parts_, and how.
-  struct Split {
-    std::uint32_t first, pattern;
+  // A triangle or a part of one, in a quarter of a cache line, since looking it up is all that a point costs.
+  // By kind: three nodes, the index of a patch, or the first part of its own and their pattern. `mark` is the
+  // kind and, but for those that are divided, what is known of the values at its nodes.
+  struct alignas(16) Part {
+    std::array<std::uint32_t, 3> data;
+    std::uint32_t mark;
   };
   struct Division;
   class Divider;
 
   void divide_meshes(double distance);
-  void make_blocks();
+  template <class Corners>
+  void place_run(const Division& run, std::uint32_t vertices, std::span<const std::uint32_t> places,
+                 const Corners& corners);
+  std::vector<std::uint32_t> sort_nodes();
   std::uint32_t find_patch(const Hit& hit, float& u, float& v) const noexcept;
-  Patch patch(std::uint32_t index) const noexcept;
+  Patch patch(const Part& part) const noexcept;
   void await_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
-  void fetch_nodes(std::uint32_t index) const noexcept;
-  void judge(std::uint32_t index) const noexcept;
+  void fetch_nodes(const Part& part) const noexcept;
+  void set_value(std::uint32_t node, const Rgb& value) const noexcept;
+  void judge(Part& part) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
-  Rgb interpolate(const Patch& patch, float u, float v) const noexcept;
+  Float4 interpolate(const Patch& patch, float u, float v) const noexcept;
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
-  std::vector<std::uint32_t> first_triangle_;          // by mesh
-  std::vector<std::array<std::uint32_t, 3>> corners_;  // of triangles, as nodes
-  std::vector<std::uint32_t> parts_;  // by triangle, then parts of splits: a patch or kSplitBit and a split
-  std::vector<Patch> patches_;        // their numbers follow those of the triangles that are whole patches
-  std::vector<Split> splits_;
-  std::vector<Vec3> positions_;             // of nodes: vertices mesh by mesh, then those on edges
+  std::vector<std::uint32_t> first_triangle_;  // by mesh
+  mutable LargeArray<Part> parts_;             // by triangle, then those of divided ones
+  std::vector<Patch> patches_;
+  std::vector<Vec3> positions_;             // of nodes, block by block
   std::vector<std::uint32_t> block_of_;     // by node
-  std::vector<std::uint32_t> block_begin_;  // first of each block in block_nodes_, and the end
-  std::vector<std::uint32_t> block_nodes_;
-  mutable std::vector<Rgb> values_;  // of nodes
-  std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_, patch_state_;
+  std::vector<std::uint32_t> block_begin_;  // the first node of each block, and the end
+  mutable LargeArray<Float4> values_;       // of nodes
+  std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_;
 };
 
 }  // namespace nacre
