@@ -185,8 +185,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
       const SumNode& node = nodes_[index];
-      const SumSource source{node.x, node.y, node.z, 0, node.power};
-      room.list.add({&source, 1});
+      room.list.add({node.x, node.y, node.z, 0, node.power});
     }
     room.list.pad();
     for (const Point& point : range) room.exitance[point.index] = eval_point(target, point, room);
@@ -241,16 +240,16 @@ void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
   constexpr std::size_t kChunk = 4096;
   std::vector<std::array<double, 3>> totals(points.size());
   SourceList list;
-  for (std::size_t begin = 0; begin < sources_.size(); begin += kChunk) {
+  for (std::size_t begin = 0; begin < group_.size(); begin += kChunk) {
     list.clear();
-    list.add(std::span<const SumSource>(sources_).subspan(begin, std::min(kChunk, sources_.size() - begin)));
+    for (std::size_t i = begin; i < std::min(begin + kChunk, group_.size()); ++i) list.add(make_source(i));
     list.pad();
     for (std::size_t i = 0; i < points.size(); ++i)
       lanes::add_sources(kernel_.tables(), list, points[i], totals[i]);
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     for (int k = 0; k < 3; ++k) exitance[i][k] = static_cast<float>(totals[i][static_cast<std::size_t>(k)]);
-  evaluations += points.size() * sources_.size();
+  evaluations += points.size() * group_.size();
 }
 
 }  // namespace nacre

@@ -87,29 +87,7 @@ Exitance::Moments Exitance::add_moments(std::uint32_t index, std::span<const std
   return sum;
 }
 
-void Exitance::make_nodes() {
-  nodes_ = LargeArray<SumNode>(group_.nodes.size());
-  parallel_for(nodes_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const OctreeNode& from = group_.nodes[i];
-      SumNode& node = nodes_[i];
-      node = SumNode{};
-      node.x = from.centre[0];
-      node.y = from.centre[1];
-      node.z = from.centre[2];
-      node.radius = from.radius;
-      node.first = from.child_count() > 0 ? from.first_child : from.first_sample;
-      node.packed_counts = from.packed_counts;
-      node.power = Float4{from.power[0], from.power[1], from.power[2], 0};
-      node.spread = -1;
-      for (int k = 0; k < 3; ++k)
-        if (from.power[k] > 0) {
-          // Rounded up by more than division and the bounds' product lose.
-          node.spread = std::max(node.spread, 0.5000003f * from.second_moment[k] / from.power[k]);
-          node.lean = std::max(node.lean, 1.0000005f * from.first_moment[k] / from.power[k]);
-        }
-    }
-  });
+void Exitance::add_all_moments() {
   // Subtrees side by side, then what is above them.
   constexpr std::size_t kSubtrees = 256;
   std::vector<std::uint32_t> roots{0}, inner;

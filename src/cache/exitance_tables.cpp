@@ -18,6 +18,10 @@ namespace {
 // over a picture, makes use of.
 constexpr double kCalibration = 11.5, kGrowth = 0.26;
 
+// Bodies of a smaller radius, in mean free paths, are summed as so few nodes that less cancels, down to a
+// share of it.
+constexpr double kManyLengths = 6, kFewest = 0.2;
+
 // A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
 // share of the bound on its third derivatives.
 constexpr double kSeriesWeight = 0.1;
@@ -34,24 +38,26 @@ constexpr float kNoLimit = 1e30f;
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
     : group_(group),
-      sources_(group.size()),
       kernel_(make_profiles(medium)),
       promise_(promise),
       allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
   spacing_ = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
-  copy_sources();
-  const Vec3 size = box_.size();
+  const OctreeNode& root = group.nodes[0];
+  const Vec3 least = Vec3(root.centre[0], root.centre[1], root.centre[2]) - Vec3(root.radius),
+             size(2 * root.radius);
   // Whole blocks around all samples, and no more than 2^20 cells an axis. Cells are for receivers, too, which
   // lie closer than a mean free path only where each of them has to be certain.
   const double length = double{smallest_mean_free_path(medium)} / double{medium.scale};
   cell_size_ = std::max({kCellSpacings * spacing_, promise == Promise::kCertified ? 0 : kCellLengths * length,
-                         0x1p-20 * double{std::max({size.x, size.y, size.z})}});
+                         0x1p-20 * double{size.x}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
   if (!(spacing_ > 0)) spacing_ = cell_size_;
+  if (promise == Promise::kCalibrated)
+    allowance_ *= std::clamp(double{root.radius} / (kManyLengths * length), kFewest, 1.0);
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
-    origin_[axis] = (std::floor(double{box_.min[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
+    origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
   if (!(tolerance > 0)) return;
   if (promise == Promise::kCertified) {
     const double tables = kernel_.relative_error(size.length()) + kRounding;
@@ -64,30 +70,13 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
            "or --method exact",
            tolerance, tables, 2 * tables);
   }
-  if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
-  make_nodes();
-  make_tables();
-}
-
-void Exitance::copy_sources() {
-  constexpr std::size_t kRun = 1 << 16;
-  std::vector<Box3> boxes((sources_.size() + kRun - 1) / kRun);
-  std::vector<float> largest(boxes.size(), 0.0f);
-  parallel_for(boxes.size(), 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t r = first; r < last; ++r)
-      for (std::size_t i = r * kRun; i < std::min((r + 1) * kRun, sources_.size()); ++i) {
-        const Vec3 p = group_.position(i);
-        const float area = group_.area(i);
-        const Rgb power = group_.irradiance(i) * area;
-        sources_[i] = {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
-        boxes[r].extendBy(p);
-        largest[r] = std::max(largest[r], area);
-      }
-  });
-  for (const Box3& box : boxes) box_.extendBy(box);
   // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
   if (kernel_.singular())
-    nearest_ = std::sqrt(Kernel::disc_reach2(*std::max_element(largest.begin(), largest.end())));
+    nearest_ = std::sqrt(Kernel::disc_reach2(std::ranges::max(group.plane(Plane::kArea))));
+  if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
+  copy_octree();
+  add_all_moments();
+  make_tables();
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

@@ -114,14 +114,12 @@ void SourceList::reserve(std::size_t count) {
   powers_.resize(2 * (size_ + count + kLongest));
 }
 
-void SourceList::add(std::span<const SumSource> sources) {
-  reserve(sources.size());
-  for (const SumSource& s : sources) {
-    const std::array<float, kFieldCount> values{s.x, s.y, s.z, s.area};
-    for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
-    powers_[size_] = s.power;
-    ++size_;
-  }
+void SourceList::add(const SumSource& source) {
+  reserve(1);
+  const std::array<float, kFieldCount> values{source.x, source.y, source.z, source.area};
+  for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
+  powers_[size_] = source.power;
+  ++size_;
 }
 
 void SourceList::pad() {

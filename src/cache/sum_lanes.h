@@ -15,7 +15,7 @@ namespace nacre {
 class SourceList {
  public:
   void clear() noexcept { size_ = 0; }
-  void add(std::span<const SumSource> sources);
+  void add(const SumSource& source);
   /// Room for `count` more and for what a vector store may spill; `grow` says how many were written.
   void reserve(std::size_t count);
   void grow(std::size_t count) noexcept { size_ += count; }

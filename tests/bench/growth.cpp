@@ -2,11 +2,14 @@
 #include "bench/growth.h"
 
 #include <malloc.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "bench/bench_scene.h"
 #include "bench/frame_cases.h"
+#include "nacre/cache/cache_file.h"
 
 namespace nacre::bench {
 namespace {
@@ -20,6 +23,23 @@ void reset_peak_memory() {
   ::malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << 5;
 }
+
+// A cache as renders find it, until the end of its life.
+class CacheFile {
+ public:
+  explicit CacheFile(const Cache& cache) { save_cache(cache, path_); }
+  ~CacheFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  CacheFile(const CacheFile&) = delete;
+  CacheFile& operator=(const CacheFile&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_ =
+      std::filesystem::temp_directory_path() / fmt::format("nacre_growth.{}.nacre", ::getpid());
+};
 
 GrowthRow measure(const World& world, const Cache& cache, int size, int runs) {
   reset_peak_memory();
@@ -45,9 +65,13 @@ void measure_growth(double most_samples, int most_pixels, int runs, Results& res
     if (samples > most_samples) break;
     fmt::print(stderr, "growth: {:.0f} samples\n", samples);
     reset_peak_memory();
-    const Cache cache = bake_samples(scene, samples, kIrradianceSamples);
+    const CacheFile file(bake_samples(scene, samples, kIrradianceSamples));
     const auto bake_peak = static_cast<double>(peak_memory_bytes());
+    const Stopwatch watch;
+    const Cache cache = load_cache(file.path());
+    const double read_seconds = watch.seconds();
     results.by_samples.push_back(measure(world, cache, kSize, runs));
+    results.by_samples.back().read_seconds = read_seconds;
     results.by_samples.back().bake_peak_bytes = bake_peak;
   }
   const Cache cache = bake_samples(scene, kSamples, kIrradianceSamples);

@@ -77,7 +77,7 @@ void add_sources(benchmark::State& state, const std::string& target, const Mediu
     source = SumSource{rng.next_float(), rng.next_float(), rng.next_float(), 1e-6f,
                        Float4{1e-6f, 2e-6f, 3e-6f, 0}};
   SourceList list;
-  list.add(sources);
+  for (const SumSource& source : sources) list.add(source);
   list.pad();
   const Vec3 x(0.4f, 0.5f, 0.6f);
   for (auto _ : state) {

@@ -64,8 +64,9 @@ std::string growth_table(const std::string& title, const std::vector<GrowthRow>&
                          double GrowthRow::*variable) {
   std::string text = fmt::format(
       "## {}\n\n"
-      "| samples | Mpixel | factor | diffusion s | factor | kernel evaluations | factor | peak of bake, MB | "
-      "peak of render, MB |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+      "| samples | Mpixel | factor | reading s | diffusion s | factor | kernel evaluations | factor | peak "
+      "of bake, MB | "
+      "peak of render, MB |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
       title);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const GrowthRow& row = rows[i];
@@ -75,8 +76,9 @@ std::string growth_table(const std::string& title, const std::vector<GrowthRow>&
                                   static_cast<double>(value(row)) / static_cast<double>(value(rows[i - 1])));
     };
     text +=
-        fmt::format("| {:.0f} | {:.2f} | {} | {:.4f} | {} | {} | {} | {} | {:.0f} |\n", row.samples,
+        fmt::format("| {:.0f} | {:.2f} | {} | {} | {:.4f} | {} | {} | {} | {} | {:.0f} |\n", row.samples,
                     row.megapixels, factor([&](const GrowthRow& r) { return r.*variable; }),
+                    row.read_seconds > 0 ? fmt::format("{:.4f}", row.read_seconds) : "",
                     row.diffusion_seconds, factor([](const GrowthRow& r) { return r.diffusion_seconds; }),
                     row.kernel_evaluations, factor([](const GrowthRow& r) { return r.kernel_evaluations; }),
                     row.bake_peak_bytes > 0 ? fmt::format("{:.0f}", row.bake_peak_bytes / 1e6) : "",
@@ -122,6 +124,7 @@ nlohmann::ordered_json growth_json(const std::vector<GrowthRow>& rows) {
                     {"diffusion_seconds", row.diffusion_seconds},
                     {"kernel_evaluations", row.kernel_evaluations},
                     {"render_peak_bytes", row.render_peak_bytes}});
+    if (row.read_seconds > 0) json.back()["read_seconds"] = row.read_seconds;
     if (row.bake_peak_bytes > 0) json.back()["bake_peak_bytes"] = row.bake_peak_bytes;
   }
   return json;

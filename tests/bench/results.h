@@ -45,6 +45,7 @@ inline constexpr double kReferenceRatio = 28;
 /// A frame of a growing cache or of growing size.
 struct GrowthRow {
   double samples = 0, megapixels = 0;
+  double read_seconds = 0;  // of the cache from its file, not part of the next
   double diffusion_seconds = 0;
   std::uint64_t kernel_evaluations = 0;
   double bake_peak_bytes = 0, render_peak_bytes = 0;  // resident, of the whole process

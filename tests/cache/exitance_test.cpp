@@ -135,7 +135,8 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
         const SurfaceSamples samples = shape.make(shape.n, lighting.light);
         const OwnedGroup owned = make_group(samples);
         const float scale = default_scale(preset, samples);
-        for (const float coarser : {1.0f, 4.0f, 8.0f}) {  // a large mean free path sees many samples at once
+        for (const float coarser :
+             {1.0f, 4.0f, 8.0f, 16.0f, 128.0f}) {  // a large mean free path sees many samples at once
           const Medium medium = make_material(preset, GetParam(), scale / coarser);
           const Exitance exact(owned.group, medium, 0);
           std::vector<Vec3> points;
@@ -163,7 +164,7 @@ TEST_P(EveryKind, RelativeErrorIsWithinTheTolerance) {
               EXPECT_LE(std::sqrt(error[k]), tolerance * std::sqrt(norm[k]))
                   << preset << ", " << shape.name << ", " << lighting.name << ", x" << coarser
                   << ", tolerance " << tolerance << ", channel " << k;
-            if (tolerance == 0.1) {
+            if (tolerance == 0.1 && coarser <= 8) {
               EXPECT_LT(evaluations, points.size() * samples.size() / 2)
                   << preset << " " << shape.name << " " << lighting.name;
             }

@@ -47,7 +47,7 @@ TEST_P(EveryTarget, SumsAListAsAPlainLoopDoes) {
     for (const std::size_t count : {1, 3, 4, 7, 8, 15, 16, 17, 63, 64, 65, 1023, 1024, 1025, 5000}) {
       const std::vector<SumSource> sources = make_sources(count);
       SourceList list;
-      list.add(sources);
+      for (const SumSource& source : sources) list.add(source);
       list.pad();
       for (const Vec3& x :
            {Vec3(0.5f, 0.4f, 0.3f), Vec3(9, 0, 0), Vec3(sources[0].x, sources[0].y, sources[0].z)}) {
@@ -114,7 +114,7 @@ TEST_P(EveryTarget, NodesCarryTheirSecondMoments) {
       s.x = static_cast<float>(d.x);
       s.y = static_cast<float>(d.y);
       s.z = static_cast<float>(d.z);
-      list.add({&s, 1});
+      list.add(s);
     }
     list.pad();
     node.xx = static_cast<float>(second[0]);

@@ -89,9 +89,12 @@ class Exitance {
   struct Target;
   struct Room;
 
+  struct Grains;
   struct Moments;
-  void copy_sources();
-  void make_nodes();
+  Grains find_grains() const;
+  SumSource make_source(std::size_t sample) const noexcept;
+  void copy_octree();
+  void add_all_moments();
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                       std::span<const Moments> moments);
   void make_tables();
@@ -111,7 +114,6 @@ class Exitance {
   double allowance_;
   float moment_slack_ = 1e-5f;  // what rounding and tables may take from second moments
   float nearest_ = 0;           // distance within which samples are summed one by one
-  Box3 box_;                    // of the samples
   double spacing_ = 1;          // distance of samples
   Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1, cells_per_unit_ = 1;
