@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -70,6 +71,17 @@ void Session::finish() {
   file.commit();
 }
 
+// A range lets nan through.
+CLI::Validator finite_number() {
+  return {[](std::string& text) {
+            double value = 0;
+            if (CLI::detail::lexical_cast(text, value) && !std::isfinite(value))
+              return text + " is no number to work with";
+            return std::string();
+          },
+          ""};
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--threads", options.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
@@ -86,7 +98,8 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
   command.add_option("-D", options.defines, "name=value: fills $name in the scene file")
       ->allow_extra_args(false);
   command.add_option("--material", options.material, "Mesh file: preset it is made of (default: Marble)");
-  command.add_option("--height", options.height, "Mesh file: height of the object in mm (default: 50)");
+  command.add_option("--height", options.height, "Mesh file: height of the object in mm (default: 50)")
+      ->check(finite_number());
 }
 
 Scene load_scene(const SceneOptions& options, Session& session) {
@@ -117,11 +130,13 @@ Scene load_scene(const SceneOptions& options, Session& session) {
 
 void add_bake_options(CLI::App& command, BakeOptions& options) {
   auto* points = command.add_option("--points", options.points, "Total number of samples, about")
-                     ->check(CLI::PositiveNumber);
+                     ->check(CLI::PositiveNumber)
+                     ->check(finite_number());
   command
       .add_option("--spacing", options.spacing,
                   "Distance of samples in mm (default: 0.65 of the smallest mean free path)")
       ->check(CLI::PositiveNumber)
+      ->check(finite_number())
       ->excludes(points);
   command
       .add_option("--irradiance-samples", options.irradiance_samples,

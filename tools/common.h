@@ -50,6 +50,8 @@ class Session {
   Report report_;
 };
 
+/// Accepts what is neither nan nor infinite.
+CLI::Validator finite_number();
 void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// A scene file, or a mesh file with a material and a height.
@@ -87,5 +89,6 @@ void add_render_command(CLI::App& app, const std::string& command_line);
 void add_info_command(CLI::App& app, const std::string& command_line);
 void add_diff_command(CLI::App& app, const std::string& command_line);
 void add_materials_command(CLI::App& app, const std::string& command_line);
+void add_export_commands(CLI::App& app, const std::string& command_line);
 
 }  // namespace nacre::tools

@@ -40,6 +40,7 @@ int main(int argc, char** argv) {
   nacre::tools::add_info_command(app, line);
   nacre::tools::add_diff_command(app, line);
   nacre::tools::add_materials_command(app, line);
+  nacre::tools::add_export_commands(app, line);
   try {
     app.parse(argc, argv);
     return 0;

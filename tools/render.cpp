@@ -8,6 +8,7 @@
 #include "nacre/base/version.h"
 #include "nacre/cache/blotch.h"
 #include "nacre/cache/cache_file.h"
+#include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
 
 namespace nacre::tools {
@@ -170,8 +171,8 @@ void check_combination(const Options& options) {
     throw UsageError("--exitance keeps what --method hierarchical interpolates, without --certified");
   if (options.tolerance && method != Method::kHierarchical)
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
-  if (options.tolerance && !(*options.tolerance >= 0))
-    throw UsageError("--tolerance is a number from 0 to 1, not nan");
+  if (!options.exitance.empty() && options.tolerance == 0.0)
+    throw UsageError("--exitance keeps what is interpolated; --tolerance 0 sums up every pixel by itself");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
     throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
 }
@@ -258,10 +259,18 @@ void save_picture(const Image& image, const Picture& picture, const Options& opt
   session.progress().say(options.png ? picture.path + " and " + picture.preview : picture.path);
 }
 
-void report_verification(const Verification& verification, Session& session) {
-  fmt::print("diffusion at {} points: relative RMSE {:.3f} %, largest error {:.2f} % against the exact sum\n",
-             verification.points, 100 * verification.relative_rmse, 100 * verification.largest);
-  session.report().notes["verified"] =
+// `camera` is empty where there is one.
+void report_verification(const Verification& verification, const std::string& camera, Session& session) {
+  if (verification.points == 0) {
+    session.warn({"--verify: no pixel was found that shows a translucent surface" +
+                  (camera.empty() ? "" : " (camera " + camera + ")")});
+    return;
+  }
+  fmt::print(
+      "{}diffusion at {} points: relative RMSE {:.3f} %, largest error {:.2f} % against the exact sum\n",
+      camera.empty() ? "" : camera + ": ", verification.points, 100 * verification.relative_rmse,
+      100 * verification.largest);
+  session.report().notes[camera.empty() ? "verified" : "verified, " + camera] =
       fmt::format("{} points, relative RMSE {:.6g}, largest error {:.6g}", verification.points,
                   verification.relative_rmse, verification.largest);
 }
@@ -272,6 +281,10 @@ void run(const Options& options, const std::string& command_line) {
   const std::optional<double> exposure = parse_exposure(options.exposure);
   Session session(options.common, command_line);
   const std::vector<Picture> pictures = plan_pictures(options);
+  // Before a bake that would be in vain.
+  if (!options.exitance.empty() && std::filesystem::exists(options.exitance) &&
+      !is_exitance_file(options.exitance))
+    load_exitance(options.exitance);
 
   const Scene scene = load_scene(options.scene, session);
   std::vector<RenderParams> params;
@@ -291,6 +304,7 @@ void run(const Options& options, const std::string& command_line) {
     const StageTimer timer(session.report(), "read_cache");
     renderer.load_exitance(options.exitance);
   }
+  bool keeps_exitance = true;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Warnings warnings;
     Image image = renderer.render(params[i], session.progress(), session.report(), warnings);
@@ -303,15 +317,19 @@ void run(const Options& options, const std::string& command_line) {
                       {"nacre:seed", fmt::format("{}", options.common.seed)},
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
     save_picture(image, pictures[i], options, exposure, session);
-    if (options.verify > 0) report_verification(renderer.verify(params[i], options.verify), session);
+    // After each picture: a run of many may be interrupted.
+    if (!options.exitance.empty()) {
+      const StageTimer timer(session.report(), "write_cache");
+      keeps_exitance = renderer.save_exitance(options.exitance);
+    }
+    if (options.verify > 0)
+      report_verification(renderer.verify(params[i], options.verify),
+                          pictures.size() > 1 ? scene.cameras[params[i].camera].id : "", session);
   }
-  if (!options.exitance.empty()) {
-    const StageTimer timer(session.report(), "write_cache");
-    if (!renderer.save_exitance(options.exitance))
-      session.warn({options.exitance +
-                    " is not written: no medium here has exitance that is smooth between nodes (normalized "
-                    "diffusion, samples further apart than a mean free path, --tolerance 0)"});
-  }
+  if (!keeps_exitance)
+    session.warn({options.exitance +
+                  " is not written: no medium here has exitance that is smooth between nodes (normalized "
+                  "diffusion, samples further apart than a mean free path)"});
   session.finish();
 }
 
@@ -342,7 +360,8 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
   command
       ->add_option("--tolerance", options->tolerance,
                    "Relative error of the hierarchical sum (default: 0.01)")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(CLI::Range(0.0, 1.0))
+      ->check(finite_number());
   command->add_option("--exitance", options->exitance,
                       "Keep the diffusion that is evaluated in this file, and take it from there next time");
   command->add_flag("--certified", options->certified,

@@ -12,6 +12,10 @@ namespace {
 
 constexpr int kPathsPerTile = 1 << 14;
 
+// Pixels that are looked at, a hundred for each that is wanted, before hardly any shows a translucent
+// surface.
+constexpr std::uint64_t kLeastTries = 1000;
+
 // Rays that are lost in closed objects, too: they met an edge or a vertex to the last bit.
 constexpr double kLostShare = 1e-6;
 
@@ -132,9 +136,11 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
   const PixelLoop loop(world_, media_, params);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(params.crop_width) * static_cast<std::uint64_t>(params.crop_height);
+  const auto wanted = static_cast<std::size_t>(count);
+  const std::uint64_t most = 100 * wanted + 100 * kLeastTries;
   std::vector<Hit> hits;
-  for (int i = 0; i < count; ++i) {
-    const std::uint64_t pixel = hash_words(params.seed, 0x766572, static_cast<std::uint64_t>(i)) % pixels;
+  for (std::uint64_t i = 0; hits.size() < wanted && i < most; ++i) {
+    const std::uint64_t pixel = hash_words(params.seed, 0x766572, i) % pixels;
     const Hit hit = loop.first_hit(static_cast<std::uint32_t>(pixel));
     if (!hit || world_.shape(hit).medium == kNone) continue;
     if (!world_.scene->media[static_cast<std::size_t>(world_.shape(hit).medium)].lambert) hits.push_back(hit);

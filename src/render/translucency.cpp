@@ -91,7 +91,7 @@ KeptExitance Translucency::keep() const {
                 {"g", triple(m.g)},
                 {"eta", fmt::format("{}", m.eta())},
                 {"mm per unit", fmt::format("{}", m.scale)},
-                {"profile", fmt::format("{}", static_cast<int>(m.profile))},
+                {"profile", kProfileNames[static_cast<std::size_t>(m.profile)]},
                 {"tolerance", fmt::format("{}", tolerance_)}};
   for (auto& entry : key) entry.first = label + "/" + entry.first;
   kept.key.front().first = label + "/" + kept.key.front().first;

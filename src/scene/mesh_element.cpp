@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "nacre/geometry/fill_holes.h"
 #include "nacre/geometry/mesh_file.h"
 #include "nacre/geometry/primitives.h"
 #include "nacre/geometry/serialized_file.h"
@@ -100,6 +101,7 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
                                                           : flat && !parameters.has("maxSmoothAngle");
   const bool has_angle = parameters.has("maxSmoothAngle");
   const float angle = parameters.number("maxSmoothAngle", 180, {0, 180});
+  const bool closes = parameters.boolean("fillHoles", false);
   const int levels = parameters.integer("subdivisions", 0, 0, 6);
   if (face_normals && has_angle)
     fail(ErrorCode::kValue, parameters.place("maxSmoothAngle"),
@@ -110,6 +112,7 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
   if (!upright)
     for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
 
+  if (closes) fill_holes(mesh, parameters.place("fillHoles"), warnings);
   if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
   place_mesh(mesh, to_world, parameters.place("toWorld"), element.place());
   if (flip) flip_normals(mesh);

@@ -322,8 +322,11 @@ void Builder::check_unused_group(const XmlElement& group) {
 }
 
 void Builder::warn_about_shape(const Shape& shape) {
-  const std::string problems = describe_problems(analyse_topology(shape.mesh));
-  if (!problems.empty()) warn(shape.place, fmt::format("{} is translucent, but {}", shape.id, problems));
+  const TopologyReport report = analyse_topology(shape.mesh);
+  const std::string problems = describe_problems(report);
+  if (!problems.empty())
+    warn(shape.place, fmt::format("{} is translucent, but {}{}", shape.id, problems,
+                                  report.boundary_edges > 0 ? "; fillHoles closes holes" : ""));
   if (shape.surface == kNone) return;
   const auto& model = scene_.surfaces[static_cast<std::size_t>(shape.surface)].model;
   if (std::holds_alternative<ConductorSurface>(model))

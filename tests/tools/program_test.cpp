@@ -121,13 +121,20 @@ TEST_F(Program, ExitanceIsKept) {
   run("bake s.xml -o s.cache");
   run("render s.xml --cache s.cache -o plain.exr --size 24x24");
   run("render s.xml --cache s.cache -o part.exr --size 24x24 --crop 0,0,12x24 --exitance e.exitance");
-  const auto part = std::filesystem::file_size(folder_.file("e.exitance"));
   run("render s.xml --cache s.cache -o first.exr --size 24x24 --exitance e.exitance");
   run("render s.xml --cache s.cache -o second.exr --size 24x24 --exitance e.exitance --report r.json");
   EXPECT_EQ(nlohmann::json::parse(read_file(folder_.file("r.json")))["counts"]["kernel_evaluations"], 0);
-  EXPECT_EQ(std::filesystem::file_size(folder_.file("e.exitance")), part);
   expect_identical("plain.exr", "first.exr");
   expect_identical("plain.exr", "second.exr");
+  // Another camera starts from it, and adds what it needs.
+  run("render s.xml --cache s.cache -o other.exr --camera other");
+  run("render s.xml --cache s.cache -o kept.exr --camera other --exitance e.exitance");
+  expect_identical("other.exr", "kept.exr");
+  EXPECT_NE(run("render s.xml --cache s.cache -o x.exr --exitance plain.exr", 1).find("plain.exr"),
+            std::string::npos);
+  EXPECT_NE(run("render s.xml --cache s.cache -o x.exr --exitance e.exitance --tolerance 0", 2)
+                .find("--tolerance 0"),
+            std::string::npos);
   const auto refused =
       run_nacre(folder_, "render s.xml --cache s.cache -o x.exr --exitance e.exitance -D sigma_a=0.2");
   EXPECT_EQ(refused.exit_code, 1);
@@ -247,7 +254,7 @@ TEST_F(Program, VerifyMeasuresTheErrorOfThePicture) {
                           &rmse, &largest),
               3)
         << output;
-    EXPECT_GT(points, 50);
+    EXPECT_EQ(points, 500);
     EXPECT_LE(rmse, largest);
     return rmse;
   };
@@ -256,6 +263,12 @@ TEST_F(Program, VerifyMeasuresTheErrorOfThePicture) {
   EXPECT_LE(loose, 10);
   EXPECT_LE(measured("--tolerance 0.001"), 0.1);
   EXPECT_EQ(measured("--tolerance 0"), 0);
+  // One line for each camera, and none where nothing was measured.
+  const std::string both = run("render s.xml -o v.exr --camera main,other --verify 20");
+  EXPECT_NE(both.find("main: diffusion at 20 points"), std::string::npos) << both;
+  EXPECT_NE(both.find("other: diffusion at 20 points"), std::string::npos) << both;
+  const std::string none = run("render s.xml -o v.exr --crop 0,0,1x1 --verify 20");
+  EXPECT_NE(none.find("--verify: no pixel"), std::string::npos) << none;
 }
 
 // What was evaluated for one picture serves the next, and changes nothing in it.

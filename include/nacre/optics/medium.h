@@ -1,6 +1,7 @@
 // The optical coefficients of a translucent material, and the presets that are measured.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -10,6 +11,8 @@
 namespace nacre {
 
 enum class ProfileKind { kDipole, kBetterDipole, kNormalized };
+/// In the order of the kinds, as scene files name them.
+inline constexpr std::array<const char*, 3> kProfileNames{"dipole", "betterdipole", "normalized"};
 enum class Convention { kPublished, kConserving };
 
 /// A homogeneous scattering medium behind a dielectric boundary. Coefficients are in 1/mm.

@@ -83,7 +83,8 @@ class Renderer {
   /// R G B is their sum. Adds to `warnings` a line for each medium with samples that found no way out of it.
   Image render(const RenderParams& params, Progress& progress, Report& report, Warnings& warnings) const;
 
-  /// Measures the error of kHierarchical at what the first samples of `count` random pixels see.
+  /// Measures the error of kHierarchical at what the first samples of `count` random pixels see that show a
+  /// translucent surface; at fewer, perhaps none, where those are less than about one in a hundred.
   Verification verify(const RenderParams& params, int count) const;
 
  private:

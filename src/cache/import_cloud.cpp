@@ -1,0 +1,190 @@
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "cache/cloud_columns.h"
+#include "geometry/ply_header.h"
+#include "nacre/base/file.h"
+#include "nacre/cache/octree.h"
+#include "nacre/cache/point_cloud.h"
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{1} << 36;
+
+std::string unescape(std::string_view line) {
+  std::string text;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] != '\\' || i + 1 == line.size()) {
+      text += line[i];
+      continue;
+    }
+    const char c = line[++i];
+    text += c == 'n' ? '\n' : c == 'r' ? '\r' : c == 't' ? '\t' : c;
+  }
+  return text;
+}
+
+// What the comments say: a cache without samples. Empty if there are none of nacre's.
+Cache parse_comments(const std::vector<std::string>& comments, const std::string& path) {
+  Cache cache;
+  for (const std::string& comment : comments) {
+    std::string_view rest = comment;
+    if (rest.ends_with('\r')) rest.remove_suffix(1);
+    const std::string mark = std::string(" ") + kCloudMark + " ";
+    if (!rest.starts_with(mark)) continue;
+    rest.remove_prefix(mark.size());
+    const std::size_t first = rest.find('\t'), second = rest.find('\t', first + 1);
+    if (first == std::string_view::npos || second == std::string_view::npos)
+      fail(ErrorCode::kSyntax, path, "the comment {} was changed; export the cache again, or give --like",
+           quote_word(comment));
+    const std::string_view what = rest.substr(0, first);
+    const std::string key = unescape(rest.substr(first + 1, second - first - 1)),
+                      value = unescape(rest.substr(second + 1));
+    if (what == kCloudFingerprint) cache.fingerprint.emplace_back(key, value);
+    if (what == kCloudInfo) cache.info.emplace_back(key, value);
+    if (what != kCloudGroup) continue;
+    CacheGroup& group = cache.groups.emplace_back();
+    group.name = key;
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), group.surface_area);
+    if (error != std::errc() || end != value.data() + value.size() || !(group.surface_area >= 0) ||
+        !std::isfinite(group.surface_area))
+      fail(ErrorCode::kSyntax, path, "the area of the group {} is {}, no number of 0 or more",
+           quote_word(key), quote_word(value));
+  }
+  return cache;
+}
+
+// The values of one vertex after the other, whatever their types.
+class VertexReader {
+ public:
+  VertexReader(const PlyHeader& header, const PlyElement& vertex, std::string& content, std::size_t body,
+               LineReader& lines, const std::string& path)
+      : header_(header), vertex_(vertex), content_(content), at_(body), lines_(lines), path_(path) {}
+
+  void read(std::vector<double>& values) {
+    values.clear();
+    if (!header_.binary) {
+      lines_.require_next("a vertex");
+      std::string_view line = lines_.line();
+      for (std::size_t p = 0; p < vertex_.properties.size(); ++p)
+        values.push_back(lines_.take_number(line, "a vertex"));
+      return;
+    }
+    for (const PlyProperty& property : vertex_.properties) values.push_back(take(property.type));
+  }
+
+ private:
+  double take(const PlyType& type) {
+    std::array<char, 8> bytes{};
+    std::memcpy(bytes.data(), content_.data() + at_, type.bytes);  // the header's promise was checked
+    at_ += type.bytes;
+    if (header_.big_endian) std::reverse(bytes.begin(), bytes.begin() + static_cast<long>(type.bytes));
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, bytes.data(), sizeof bits);
+    if (!type.is_float) return static_cast<double>(bits);
+    return type.bytes == 4 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
+                           : std::bit_cast<double>(bits);
+  }
+
+  const PlyHeader& header_;
+  const PlyElement& vertex_;
+  const std::string& content_;
+  std::size_t at_;
+  LineReader& lines_;
+  const std::string& path_;
+};
+
+// Where each column is among the properties; the last is the group's, if there is one.
+std::array<std::optional<std::size_t>, kPlaneCount + 1> find_columns(const PlyElement& vertex,
+                                                                     const std::string& path) {
+  std::array<std::optional<std::size_t>, kPlaneCount + 1> columns;
+  for (std::size_t p = 0; p < vertex.properties.size(); ++p) {
+    if (vertex.properties[p].list)
+      fail(ErrorCode::kUnsupported, path, "cannot read the list {} of the vertices; save the file without it",
+           quote_word(vertex.properties[p].name));
+    for (std::size_t c = 0; c <= kPlaneCount; ++c)
+      if (vertex.properties[p].name == (c < kPlaneCount ? kCloudColumns[c] : kGroupColumn)) columns[c] = p;
+  }
+  for (std::size_t c = 0; c < kPlaneCount; ++c)
+    if (!columns[c])
+      fail(ErrorCode::kUnsupported, path,
+           "the vertices have no property {}; it takes x y z nx ny nz area er eg eb", kCloudColumns[c]);
+  return columns;
+}
+
+void check_value(double value, Plane plane, std::uint64_t index, const std::string& path) {
+  const char* const name = kCloudColumns[static_cast<std::size_t>(plane)];
+  if (!(std::abs(value) <= double{std::numeric_limits<float>::max()}))
+    fail(ErrorCode::kValue, path, "{} of point {} is not a finite number", name, index);
+  if (plane >= Plane::kArea && value < 0)
+    fail(ErrorCode::kValue, path, "{} of point {} is {:g}; it has to be 0 or more", name, index, value);
+}
+
+}  // namespace
+
+Cache import_cloud(const std::string& path, const Cache* like) {
+  std::string content = read_text_file(path, kMostBytes);
+  LineReader lines(content, path);
+  const PlyHeader header = parse_ply_header(lines);
+  const auto body =
+      std::min(static_cast<std::size_t>(lines.line().data() - content.data()) + lines.line().size() + 1,
+               content.size());
+  if (header.elements.empty() || header.elements[0].name != "vertex")
+    fail(ErrorCode::kUnsupported, path, "the file does not begin with an element vertex; save it as points");
+  const PlyElement& vertex = header.elements[0];
+  const auto columns = find_columns(vertex, path);
+  std::uint64_t bytes = 0;
+  for (const PlyProperty& p : vertex.properties) bytes += header.binary ? p.type.bytes : 2;
+  if (bytes * vertex.count > content.size() - body + 1 - header.binary)
+    fail(ErrorCode::kTruncated, path, "the header promises {} points, at least {} bytes, but {} follow",
+         vertex.count, bytes * vertex.count, content.size() - body);
+
+  Cache cache = parse_comments(header.comments, path);
+  if (like) {
+    cache = {like->fingerprint, like->info, {}, nullptr};
+    for (const CacheGroup& group : like->groups) {
+      CacheGroup& own = cache.groups.emplace_back();
+      own.name = group.name;
+      own.surface_area = group.surface_area;
+    }
+  } else if (cache.fingerprint.empty() || cache.groups.empty()) {
+    fail(ErrorCode::kUnsupported, path,
+         "it does not say what it was baked from (some programs drop the comments that do): name the cache "
+         "that "
+         "it was exported from with --like");
+  }
+  std::vector<SurfaceSamples> samples(cache.groups.size());
+  VertexReader reader(header, vertex, content, body, lines, path);
+  std::vector<double> values;
+  for (std::uint64_t i = 0; i < vertex.count; ++i) {
+    reader.read(values);
+    std::array<float, kPlaneCount> v;
+    for (std::size_t c = 0; c < kPlaneCount; ++c) {
+      check_value(values[*columns[c]], static_cast<Plane>(c), i, path);
+      v[c] = static_cast<float>(values[*columns[c]]);
+    }
+    for (std::size_t e = 7; e < kPlaneCount; ++e)
+      if (!std::isfinite(v[e] * v[6]))
+        fail(ErrorCode::kValue, path, "{} times the area of point {} is not finite", kCloudColumns[e], i);
+    const double group = columns[kPlaneCount] ? values[*columns[kPlaneCount]] : 0;
+    if (!(group >= 0 && group < static_cast<double>(samples.size()) && group == std::floor(group)))
+      fail(ErrorCode::kValue, path, "point {} is of group {:g}; there are {}", i, group, samples.size());
+    SurfaceSamples& into = samples[static_cast<std::size_t>(group)];
+    into.positions.emplace_back(v[0], v[1], v[2]);
+    into.normals.emplace_back(v[3], v[4], v[5]);
+    into.areas.push_back(v[6]);
+    into.irradiance.emplace_back(v[7], v[8], v[9]);
+  }
+  std::vector<std::shared_ptr<const void>> storage;
+  for (std::size_t g = 0; g < samples.size(); ++g)
+    cache.groups[g] = build_group(cache.groups[g].name, cache.groups[g].surface_area, samples[g], storage);
+  cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
+  return cache;
+}
+
+}  // namespace nacre
