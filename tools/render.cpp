@@ -242,6 +242,9 @@ std::vector<Picture> plan_pictures(const Options& options) {
     inputs.push_back(options.exitance);
   }
   for (const Picture& picture : pictures) {
+    if (!options.exitance.empty() &&
+        (picture.path == options.exitance || (options.png && picture.preview == options.exitance)))
+      throw UsageError("--exitance " + options.exitance + ": a picture would be written there");
     check_writable(picture.path, inputs);
     if (!options.png) continue;
     if (picture.preview == picture.path)

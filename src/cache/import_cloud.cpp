@@ -159,6 +159,7 @@ Cache import_cloud(const std::string& path, const Cache* like) {
          "it was exported from with --like");
   }
   std::vector<SurfaceSamples> samples(cache.groups.size());
+  if (vertex.count == 0) fail(ErrorCode::kValue, path, "it holds no points; export the cache again");
   VertexReader reader(header, vertex, content, body, lines, path);
   std::vector<double> values;
   for (std::uint64_t i = 0; i < vertex.count; ++i) {

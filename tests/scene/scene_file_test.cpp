@@ -219,7 +219,7 @@ TEST(SceneFile, UnknownParametersAreWarnedOfWithTheKnownOnes) {
 <float name="radiuss" value="2"/></shape>)");
   EXPECT_EQ(count_warnings(scene,
                            "scene.xml:3: shape 'disk' has no parameter 'radiuss', ignored (there are: "
-                           "toWorld, flipNormals, faceNormals, maxSmoothAngle, subdivisions, "
+                           "toWorld, flipNormals, faceNormals, maxSmoothAngle, fillHoles, subdivisions, "
                            "flipTexCoords)"),
             1);
 }
