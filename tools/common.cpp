@@ -175,10 +175,18 @@ Cache run_bake(const World& world, const BakeParams& params, Session& session) {
   return bake(world, plan, params, session.progress(), session.report());
 }
 
-void check_writable(const std::string& path, const std::vector<std::string>& inputs) {
+// Whether two names are of one file, be it there yet or not.
+bool is_same_file(const std::string& a, const std::string& b) {
   std::error_code ignored;
+  const auto resolve = [&](const std::string& name) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(name, ignored), ignored);
+  };
+  return std::filesystem::equivalent(a, b, ignored) || resolve(a) == resolve(b);
+}
+
+void check_writable(const std::string& path, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs)
-    if (!input.empty() && std::filesystem::equivalent(path, input, ignored))
+    if (!input.empty() && is_same_file(path, input))
       throw UsageError(path + " is what this command reads; give another output file");
   const AtomicFile probe(path);
 }

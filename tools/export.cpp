@@ -11,12 +11,6 @@ struct Options {
   std::string input, output, like;
 };
 
-std::size_t count_samples(const Cache& cache) {
-  std::size_t count = 0;
-  for (const CacheGroup& group : cache.groups) count += group.size();
-  return count;
-}
-
 void run_export(const Options& options, const std::string& command_line) {
   Session session(options.common, command_line);
   check_writable(options.output, {options.input});
@@ -28,7 +22,7 @@ void run_export(const Options& options, const std::string& command_line) {
     const StageTimer timer(session.report(), "write_points");
     export_cloud(cache, options.output);
   }
-  session.progress().say(fmt::format("{}: {} points", options.output, count_samples(cache)));
+  session.progress().say(fmt::format("{}: {} points", options.output, cache.sample_count()));
   session.finish();
 }
 
@@ -44,7 +38,7 @@ void run_import(const Options& options, const std::string& command_line) {
     const StageTimer timer(session.report(), "write_cache");
     save_cache(cache, options.output);
   }
-  session.progress().say(fmt::format("{}: {} samples", options.output, count_samples(cache)));
+  session.progress().say(fmt::format("{}: {} samples", options.output, cache.sample_count()));
   session.finish();
 }
 

@@ -242,9 +242,6 @@ std::vector<Picture> plan_pictures(const Options& options) {
     inputs.push_back(options.exitance);
   }
   for (const Picture& picture : pictures) {
-    if (!options.exitance.empty() &&
-        (picture.path == options.exitance || (options.png && picture.preview == options.exitance)))
-      throw UsageError("--exitance " + options.exitance + ": a picture would be written there");
     check_writable(picture.path, inputs);
     if (!options.png) continue;
     if (picture.preview == picture.path)
@@ -284,7 +281,7 @@ void run(const Options& options, const std::string& command_line) {
   const std::optional<double> exposure = parse_exposure(options.exposure);
   Session session(options.common, command_line);
   const std::vector<Picture> pictures = plan_pictures(options);
-  // Before a bake that would be in vain.
+  // Another kind of file is an error now, before a bake that would be in vain.
   if (!options.exitance.empty() && std::filesystem::exists(options.exitance) &&
       !is_exitance_file(options.exitance))
     load_exitance(options.exitance);
@@ -308,6 +305,7 @@ void run(const Options& options, const std::string& command_line) {
     renderer.load_exitance(options.exitance);
   }
   bool keeps_exitance = true;
+  std::size_t kept_nodes = 0;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Warnings warnings;
     Image image = renderer.render(params[i], session.progress(), session.report(), warnings);
@@ -320,10 +318,12 @@ void run(const Options& options, const std::string& command_line) {
                       {"nacre:seed", fmt::format("{}", options.common.seed)},
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
     save_picture(image, pictures[i], options, exposure, session);
-    // After each picture: a run of many may be interrupted.
-    if (!options.exitance.empty()) {
+    // After each picture that adds to it: a run of many may be interrupted.
+    if (const std::size_t nodes = renderer.filled_node_count();
+        !options.exitance.empty() && (i == 0 || nodes > kept_nodes)) {
       const StageTimer timer(session.report(), "write_cache");
       keeps_exitance = renderer.save_exitance(options.exitance);
+      kept_nodes = nodes;
     }
     if (options.verify > 0)
       report_verification(renderer.verify(params[i], options.verify),

@@ -120,10 +120,13 @@ void ExitanceField::fill(std::uint64_t& evaluations) const {
   });
 }
 
-KeptExitance ExitanceField::keep() const {
+std::string ExitanceField::nodes_digest() const {
   const XXH128_hash_t hash = XXH3_128bits(positions_.data(), positions_.size() * sizeof(Vec3));
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+KeptExitance ExitanceField::keep() const {
   KeptExitance kept;
-  kept.key = {{"nodes", fmt::format("{:016x}{:016x}", hash.high64, hash.low64)}};
   kept.filled.resize(block_begin_.size() - 1);
   kept.values.resize(values_.size(), Rgb(0, 0, 0));
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {

@@ -1,5 +1,4 @@
-#include <array>
-
+// A cache as a point cloud.
 #include "cache/cloud_columns.h"
 #include "nacre/base/file.h"
 #include "nacre/cache/point_cloud.h"
@@ -34,12 +33,9 @@ std::string make_header(const Cache& cache) {
   };
   for (const auto& [key, value] : cache.fingerprint) comment(kCloudFingerprint, key, value);
   for (const auto& [key, value] : cache.info) comment(kCloudInfo, key, value);
-  std::size_t count = 0;
-  for (const CacheGroup& group : cache.groups) {
+  for (const CacheGroup& group : cache.groups)
     comment(kCloudGroup, group.name, fmt::format("{}", group.surface_area));
-    count += group.size();
-  }
-  text += fmt::format("element vertex {}\n", count);
+  text += fmt::format("element vertex {}\n", cache.sample_count());
   for (const char* column : kCloudColumns) text += fmt::format("property float {}\n", column);
   return text + fmt::format("property int {}\nend_header\n", kGroupColumn);
 }

@@ -1,3 +1,4 @@
+// A cache from a point cloud.
 #include <algorithm>
 #include <bit>
 #include <charconv>
@@ -62,9 +63,9 @@ Cache parse_comments(const std::vector<std::string>& comments, const std::string
 // The values of one vertex after the other, whatever their types.
 class VertexReader {
  public:
-  VertexReader(const PlyHeader& header, const PlyElement& vertex, std::string& content, std::size_t body,
-               LineReader& lines, const std::string& path)
-      : header_(header), vertex_(vertex), content_(content), at_(body), lines_(lines), path_(path) {}
+  VertexReader(const PlyHeader& header, const PlyElement& vertex, const std::string& content,
+               std::size_t body, LineReader& lines)
+      : header_(header), vertex_(vertex), content_(content), at_(body), lines_(lines) {}
 
   void read(std::vector<double>& values) {
     values.clear();
@@ -96,7 +97,6 @@ class VertexReader {
   const std::string& content_;
   std::size_t at_;
   LineReader& lines_;
-  const std::string& path_;
 };
 
 // Where each column is among the properties; the last is the group's, if there is one.
@@ -131,18 +131,16 @@ Cache import_cloud(const std::string& path, const Cache* like) {
   std::string content = read_text_file(path, kMostBytes);
   LineReader lines(content, path);
   const PlyHeader header = parse_ply_header(lines);
-  const auto body =
-      std::min(static_cast<std::size_t>(lines.line().data() - content.data()) + lines.line().size() + 1,
-               content.size());
+  const std::size_t body = lines.next_begin();
   if (header.elements.empty() || header.elements[0].name != "vertex")
     fail(ErrorCode::kUnsupported, path, "the file does not begin with an element vertex; save it as points");
   const PlyElement& vertex = header.elements[0];
   const auto columns = find_columns(vertex, path);
-  std::uint64_t bytes = 0;
-  for (const PlyProperty& p : vertex.properties) bytes += header.binary ? p.type.bytes : 2;
-  if (bytes * vertex.count > content.size() - body + 1 - header.binary)
+  if (vertex.count == 0) fail(ErrorCode::kValue, path, "it holds no points; export the cache again");
+  const std::uint64_t bytes = smallest_size(vertex, header.binary) * vertex.count;
+  if (bytes > content.size() - body + 1 - header.binary)
     fail(ErrorCode::kTruncated, path, "the header promises {} points, at least {} bytes, but {} follow",
-         vertex.count, bytes * vertex.count, content.size() - body);
+         vertex.count, bytes, content.size() - body);
 
   Cache cache = parse_comments(header.comments, path);
   if (like) {
@@ -154,13 +152,11 @@ Cache import_cloud(const std::string& path, const Cache* like) {
     }
   } else if (cache.fingerprint.empty() || cache.groups.empty()) {
     fail(ErrorCode::kUnsupported, path,
-         "it does not say what it was baked from (some programs drop the comments that do): name the cache "
-         "that "
-         "it was exported from with --like");
+         "it does not say what it was baked from, as some programs drop the comments that do: name the cache "
+         "that it was exported from with --like");
   }
   std::vector<SurfaceSamples> samples(cache.groups.size());
-  if (vertex.count == 0) fail(ErrorCode::kValue, path, "it holds no points; export the cache again");
-  VertexReader reader(header, vertex, content, body, lines, path);
+  VertexReader reader(header, vertex, content, body, lines);
   std::vector<double> values;
   for (std::uint64_t i = 0; i < vertex.count; ++i) {
     reader.read(values);

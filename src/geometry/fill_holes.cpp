@@ -1,3 +1,4 @@
+// Holes: their outlines, and triangles over them.
 #include "nacre/geometry/fill_holes.h"
 
 #include <algorithm>

@@ -71,21 +71,13 @@ void write_face(const PlyElement& face, bool binary, const std::string& path, st
     out += fmt::format("property {} unused\n", scalar_name(face.properties[i].type, binary));
 }
 
-// The fewest bytes that an element takes.
-std::uint64_t smallest_size(const PlyElement& element, bool binary) {
-  std::uint64_t bytes = 0;
-  for (const PlyProperty& p : element.properties)
-    bytes += !binary ? 2 : p.list ? p.list->bytes : p.type.bytes;
-  return bytes;
-}
-
 }  // namespace
 
 GuardedFile guard_ply(std::string content, const std::string& path) {
   LineReader lines(content, path);
   const PlyHeader header = parse_ply_header(lines);
-  const auto body = static_cast<std::size_t>(lines.line().data() - content.data()) + lines.line().size() + 1;
-  const std::uint64_t body_bytes = content.size() > body ? content.size() - body : 0;
+  const std::size_t body = lines.next_begin();
+  const std::uint64_t body_bytes = content.size() - body;
 
   GuardedFile file;
   file.binary = header.binary;
@@ -127,7 +119,7 @@ GuardedFile guard_ply(std::string content, const std::string& path) {
          file.vertices, file.faces, needed_bytes, body_bytes);
   out += "end_header\n";
   file.line_shift = static_cast<std::int64_t>(lines.number()) - std::count(out.begin(), out.end(), '\n');
-  content.replace(0, std::min(body, content.size()), out);
+  content.replace(0, body, out);
   if (!file.binary) content += '\n';
   file.content = std::move(content);
   return file;

@@ -1,3 +1,4 @@
+// Parsing of PLY headers.
 #include "geometry/ply_header.h"
 
 #include <limits>
@@ -51,6 +52,13 @@ PlyProperty parse_property(const LineReader& lines, std::string_view rest) {
 }
 
 }  // namespace
+
+std::uint64_t smallest_size(const PlyElement& element, bool binary) {
+  std::uint64_t bytes = 0;
+  for (const PlyProperty& p : element.properties)
+    bytes += !binary ? 2 : p.list ? p.list->bytes : p.type.bytes;
+  return bytes;
+}
 
 PlyHeader parse_ply_header(LineReader& lines) {
   PlyHeader header;

@@ -33,6 +33,9 @@ struct PlyHeader {
   std::vector<std::string> comments;  // without the word
 };
 
+/// The fewest bytes that an element takes.
+std::uint64_t smallest_size(const PlyElement& element, bool binary);
+
 /// Reads a header and leaves `lines` at its last line. Throws Error(kSyntax | kUnsupported) with the line.
 PlyHeader parse_ply_header(LineReader& lines);
 

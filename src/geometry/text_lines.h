@@ -60,6 +60,8 @@ class LineReader {
     std::fill_n(text_.begin() + (part.data() - text_.data()), part.size(), ' ');
   }
   std::uint64_t number() const { return number_; }
+  /// Where the next line begins in the text.
+  std::size_t next_begin() const { return std::min(next_, text_.size()); }
 
   template <class... Args>
   [[noreturn]] void fail_here(ErrorCode code, fmt::format_string<Args...> format, Args&&... args) const {

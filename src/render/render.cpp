@@ -89,6 +89,12 @@ bool Renderer::save_exitance(const std::string& path) const {
   return any;
 }
 
+std::size_t Renderer::filled_node_count() const {
+  std::size_t count = 0;
+  for (const Translucency& medium : media_) count += medium.filled_node_count();
+  return count;
+}
+
 Image render(const World& world, const Cache& cache, const RenderParams& params, Progress& progress,
              Report& report, Warnings& warnings) {
   return Renderer(world, cache, params, report).render(params, progress, report, warnings);

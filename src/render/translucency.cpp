@@ -79,9 +79,7 @@ std::string Translucency::describe_path() const {
 }
 
 // All that M_o depends on, by name.
-KeptExitance Translucency::keep() const {
-  if (!field_) return {};
-  KeptExitance kept = field_->keep();
+KeyValues Translucency::make_key() const {
   const Medium& m = world_.scene->media[medium_];
   const auto triple = [](const Rgb& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
   const std::string label = medium_label(*world_.scene, medium_);
@@ -91,11 +89,18 @@ KeptExitance Translucency::keep() const {
                 {"g", triple(m.g)},
                 {"eta", fmt::format("{}", m.eta())},
                 {"mm per unit", fmt::format("{}", m.scale)},
-                {"profile", kProfileNames[static_cast<std::size_t>(m.profile)]},
-                {"tolerance", fmt::format("{}", tolerance_)}};
+                {"profile", std::string(kProfileNames[static_cast<std::size_t>(m.profile)])},
+                {"tolerance", fmt::format("{}", tolerance_)},
+                {"nodes", field_->nodes_digest()}};
   for (auto& entry : key) entry.first = label + "/" + entry.first;
-  kept.key.front().first = label + "/" + kept.key.front().first;
-  kept.key.insert(kept.key.begin(), key.begin(), key.end());
+  return key;
+}
+
+KeptExitance Translucency::keep() const {
+  if (!field_) return {};
+  if (key_.empty()) key_ = make_key();
+  KeptExitance kept = field_->keep();
+  kept.key = key_;
   return kept;
 }
 

@@ -47,6 +47,7 @@ class Translucency {
   std::vector<std::uint32_t> block_of_node() const {
     return field_ ? field_->block_of_node() : std::vector<std::uint32_t>{};
   }
+  std::size_t filled_node_count() const { return field_ ? field_->filled_node_count() : 0; }
   void restore(const KeptExitance& kept) const {
     if (field_) field_->restore(kept);
   }
@@ -57,6 +58,7 @@ class Translucency {
 
  private:
   void make_field(const CacheGroup& group, double tolerance);
+  KeyValues make_key() const;
   Rgb lambert_exitance(const ExitPoint& point) const;
 
   const World& world_;
@@ -71,6 +73,7 @@ class Translucency {
   const CacheGroup* group_;
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;
+  mutable KeyValues key_;  // of what is kept, once it was asked for: all samples are hashed
   std::optional<MonteCarloDiffusion> monte_carlo_;
   std::optional<SingleScattering> single_;
 };

@@ -74,8 +74,7 @@ MediumElement read_medium(const XmlElement& element, const TextureIndex& texture
     medium.int_ior = parameters.ior("intIOR", "bk7");
     medium.ext_ior = parameters.ior("extIOR", "air");
   }
-  medium.profile = static_cast<ProfileKind>(
-      parameters.choice("profile", {kProfileNames[0], kProfileNames[1], kProfileNames[2]}));
+  medium.profile = static_cast<ProfileKind>(parameters.choice("profile", kProfileNames));
   medium.convention = static_cast<Convention>(parameters.choice("convention", {"published", "conserving"}));
   medium.lambert = parameters.boolean("lambert", false);
 

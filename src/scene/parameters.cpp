@@ -166,8 +166,8 @@ float Parameters::length_mm(std::string_view name, float fallback) {
   return value;
 }
 
-int Parameters::choice(std::string_view name, std::initializer_list<std::string_view> choices) {
-  const std::string text = to_lower(string(name, std::string(*choices.begin())));
+int Parameters::choice(std::string_view name, std::span<const std::string_view> choices) {
+  const std::string text = to_lower(string(name, std::string(choices.front())));
   const auto found = std::ranges::find(choices, text);
   if (found == choices.end())
     fail(ErrorCode::kValue, place(name), "{} is '{}', it has to be one of {}", name, text,

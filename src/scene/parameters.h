@@ -4,6 +4,7 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -50,7 +51,10 @@ class Parameters {
   float ior(std::string_view name, std::string_view fallback);  // a number, or a name like "bk7"
   float length_mm(std::string_view name, float fallback);       // "50mm", "50" or a number
   /// Index of the string in `choices`.
-  int choice(std::string_view name, std::initializer_list<std::string_view> choices);
+  int choice(std::string_view name, std::span<const std::string_view> choices);
+  int choice(std::string_view name, std::initializer_list<std::string_view> choices) {
+    return choice(name, std::span(choices.begin(), choices.size()));
+  }
 
   bool has(std::string_view name) { return find(name) != nullptr; }
   /// Line of the parameter, or of the plugin if it is absent.

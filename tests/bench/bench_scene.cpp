@@ -61,10 +61,4 @@ Cache bake_samples(const Scene& scene, std::optional<double> points, std::option
   return bake(make_world(scene, params.shadows), plan_bake(scene, params), params, progress, report);
 }
 
-std::size_t sample_count(const Cache& cache) {
-  std::size_t count = 0;
-  for (const CacheGroup& group : cache.groups) count += group.size();
-  return count;
-}
-
 }  // namespace nacre::bench

@@ -29,7 +29,5 @@ World make_frame_world(const Scene& scene);
 
 /// Bakes in memory, with shadows; `points` as in BakeParams.
 Cache bake_samples(const Scene& scene, std::optional<double> points, std::optional<int> irradiance_samples);
-/// Samples of all groups.
-std::size_t sample_count(const Cache& cache);
 
 }  // namespace nacre::bench

@@ -87,13 +87,13 @@ void measure_scene(const BenchScene& spec, const Options& options, Results& resu
     fmt::print(stderr, "{}: baking, {} density\n", spec.title, densities[d].name);
     const Cache cache = bake_samples(scene, densities[d].points, irradiance_samples);
     for (std::size_t view = 0; view < views; ++view) {
-      fmt::print(stderr, "{}, {}: {} samples\n", spec.title, spec.views[view], sample_count(cache));
+      fmt::print(stderr, "{}, {}: {} samples\n", spec.title, spec.views[view], cache.sample_count());
       const bool certified_frame = spec.name == "bunny50" && !options.quick;
       for (CaseRow& row : run_cases({world, cache, view, size, size / 4, certified_frame, runs})) {
         row.scene = spec.title;
         row.view = spec.views[view];
         row.density = densities[d].name;
-        row.samples = sample_count(cache);
+        row.samples = cache.sample_count();
         fmt::print(stderr, "  {}, {}x{}: {:.4f} s / {:.4f} s = {:.3f} {}\n", row.name, row.width, row.height,
                    row.diffusion_seconds, row.primary_seconds, row.ratio(), row.met());
         results.cases.push_back(std::move(row));

@@ -48,7 +48,7 @@ GrowthRow measure(const World& world, const Cache& cache, int size, int runs) {
   for (int run = 0; run < runs; ++run) times.push_back(time_first_frame(world, cache, params));
   const FrameTime time = median_time(times);
   GrowthRow row;
-  row.samples = static_cast<double>(sample_count(cache));
+  row.samples = static_cast<double>(cache.sample_count());
   row.megapixels = static_cast<double>(size) * size / (1 << 20);
   row.diffusion_seconds = time.diffusion;
   row.kernel_evaluations = time.evaluations;

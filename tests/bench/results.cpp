@@ -64,9 +64,8 @@ std::string growth_table(const std::string& title, const std::vector<GrowthRow>&
                          double GrowthRow::*variable) {
   std::string text = fmt::format(
       "## {}\n\n"
-      "| samples | Mpixel | factor | reading s | diffusion s | factor | kernel evaluations | factor | peak "
-      "of bake, MB | "
-      "peak of render, MB |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+      "| samples | Mpixel | factor | reading s | diffusion s | factor | kernel evaluations | factor "
+      "| peak of bake, MB | peak of render, MB |\n|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
       title);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const GrowthRow& row = rows[i];

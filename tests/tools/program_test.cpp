@@ -122,7 +122,9 @@ TEST_F(Program, ExitanceIsKept) {
   run("render s.xml --cache s.cache -o plain.exr --size 24x24");
   run("render s.xml --cache s.cache -o part.exr --size 24x24 --crop 0,0,12x24 --exitance e.exitance");
   run("render s.xml --cache s.cache -o first.exr --size 24x24 --exitance e.exitance");
+  const std::string kept = read_file(folder_.file("e.exitance"));
   run("render s.xml --cache s.cache -o second.exr --size 24x24 --exitance e.exitance --report r.json");
+  EXPECT_EQ(read_file(folder_.file("e.exitance")), kept);
   EXPECT_EQ(nlohmann::json::parse(read_file(folder_.file("r.json")))["counts"]["kernel_evaluations"], 0);
   expect_identical("plain.exr", "first.exr");
   expect_identical("plain.exr", "second.exr");
@@ -131,6 +133,8 @@ TEST_F(Program, ExitanceIsKept) {
   run("render s.xml --cache s.cache -o kept.exr --camera other --exitance e.exitance");
   expect_identical("other.exr", "kept.exr");
   EXPECT_NE(run("render s.xml --cache s.cache -o x.exr --exitance plain.exr", 1).find("plain.exr"),
+            std::string::npos);
+  EXPECT_NE(run("render s.xml --cache s.cache -o new.exr --exitance ./new.exr", 2).find("new.exr"),
             std::string::npos);
   EXPECT_NE(run("render s.xml --cache s.cache -o x.exr --exitance e.exitance --tolerance 0", 2)
                 .find("--tolerance 0"),

@@ -85,6 +85,12 @@ struct Cache {
   KeyValues info;         // what is recorded but never compared: version, seed, spacing, coefficients
   std::vector<CacheGroup> groups;  // parallel to the scene's media
   std::shared_ptr<const void> storage;
+
+  std::size_t sample_count() const {
+    std::size_t count = 0;
+    for (const CacheGroup& group : groups) count += group.size();
+    return count;
+  }
 };
 
 /// Distance of a hexagonal lattice of the same density: sqrt(2/sqrt(3) * area / count).

@@ -46,9 +46,11 @@ class ExitanceField {
   std::size_t node_count() const { return positions_.size(); }
   std::size_t filled_node_count() const;
   const std::vector<std::uint32_t>& block_of_node() const { return block_of_; }
-  /// What is evaluated so far, with a hash of where the nodes are as the key.
+  /// A 32-digit hash of where the nodes are.
+  std::string nodes_digest() const;
+  /// What is evaluated so far; the key is left to those who know of the material.
   KeptExitance keep() const;
-  /// Takes over what an equal field has evaluated: same key, same numbers. Not while others evaluate.
+  /// Takes over what an equal field has evaluated: same nodes, same numbers. Not while others evaluate.
   void restore(const KeptExitance& kept) const;
 
  private:

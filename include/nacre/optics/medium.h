@@ -12,7 +12,7 @@ namespace nacre {
 
 enum class ProfileKind { kDipole, kBetterDipole, kNormalized };
 /// In the order of the kinds, as scene files name them.
-inline constexpr std::array<const char*, 3> kProfileNames{"dipole", "betterdipole", "normalized"};
+inline constexpr std::array<std::string_view, 3> kProfileNames{"dipole", "betterdipole", "normalized"};
 enum class Convention { kPublished, kConserving };
 
 /// A homogeneous scattering medium behind a dielectric boundary. Coefficients are in 1/mm.

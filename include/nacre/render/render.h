@@ -76,6 +76,8 @@ class Renderer {
   /// Adds what has been evaluated to that file, if that is anything new; returns whether there is anything to
   /// keep. Throws Error with `path`.
   bool save_exitance(const std::string& path) const;
+  /// Number of nodes on surfaces that are known so far.
+  std::size_t filled_node_count() const;
 
   /// Renders one picture. A pixel depends on the scene, the cache, its own coordinates and the parameters but
   /// for the crop, and on nothing else: not on threads, nor on pictures before it. Layers: `diffusion`,
