@@ -74,7 +74,7 @@ void Exitance::place(Target& target, std::span<const Point> range, int level, co
 Float4 Exitance::weigh(const Target& target, Room& room) const {
   const bool certified = promise_ == Promise::kCertified;
   const CoarseTest test{nodes_.data(), target.centre, certified ? kBoundRatio : kGuessRatio, certified,
-                        certified ? target.radius : nearest_ / 8};
+                        target.radius};
   Float4 total = broadcast(0);
   room.nodes.work.clear();
   room.nodes.work.push(0);
@@ -136,7 +136,6 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   const NodeTest test{.nodes = nodes_.data(),
                       .centre = target.centre,
                       .radius = target.radius,
-                      .nearest = nearest_,
                       .open_small = is_leaf,
                       .certified = certified,
                       .ratio = certified ? static_cast<float>(kCertifiedRatio) : kRatio,

@@ -64,15 +64,14 @@ struct Exitance::Grains {
 
 SumSource Exitance::make_source(std::size_t sample) const noexcept {
   const Vec3 p = group_.position(sample);
-  const float area = group_.area(sample);
-  const Rgb power = group_.irradiance(sample) * area;
-  return {p.x, p.y, p.z, area, Float4{power.x, power.y, power.z, 0}};
+  const Rgb power = group_.irradiance(sample) * group_.area(sample);
+  return {p.x, p.y, p.z, 0, Float4{power.x, power.y, power.z, 0}};
 }
 
 // None where each sample has to be certain, or counts by itself.
 Exitance::Grains Exitance::find_grains() const {
   Grains grains;
-  if (promise_ == Promise::kCertified || kernel_.singular()) return grains;
+  if (promise_ == Promise::kCertified) return grains;
   const DistanceBins bins = kernel_.bound_bins();
   for (std::int32_t bin = bins.first; bin < bins.last; ++bin) {
     const Kernel::Bounds& bounds = kernel_.bounds(std::bit_cast<float>(bin << bins.shift));

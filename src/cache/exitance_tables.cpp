@@ -38,11 +38,11 @@ constexpr float kNoLimit = 1e30f;
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
     : group_(group),
-      kernel_(make_profiles(medium)),
+      spacing_(hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
+      kernel_(resolve_profiles(make_profiles(medium), spacing_)),
       promise_(promise),
       allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
-  spacing_ = hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
   const OctreeNode& root = group.nodes[0];
   const Vec3 least = Vec3(root.centre[0], root.centre[1], root.centre[2]) - Vec3(root.radius),
              size(2 * root.radius);
@@ -70,9 +70,6 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
            "or --method exact",
            tolerance, tables, 2 * tables);
   }
-  // Samples whose own share a singular profile has to be averaged over are never hidden in a node.
-  if (kernel_.singular())
-    nearest_ = std::sqrt(Kernel::disc_reach2(std::ranges::max(group.plane(Plane::kArea))));
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
   copy_octree();
   add_all_moments();

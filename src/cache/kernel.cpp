@@ -1,4 +1,4 @@
-// Tabulating a profile; averages of 1/r over discs.
+// Tabulating a profile.
 #include "nacre/cache/kernel.h"
 
 #include <algorithm>
@@ -9,30 +9,6 @@
 namespace nacre {
 namespace {
 
-// Mean of 1/|x - y| over y in the unit disc, for |x| = t: complete elliptic integrals. Source: Lass & Blitzer
-// 1983.
-double mean_inverse_distance(double t) {
-  if (t <= 1) return 4 / kPiD * std::comp_ellint_2(std::min(t, 1.0));
-  const double k = 1 / t;
-  return 4 / kPiD * t * (std::comp_ellint_2(k) - (1 - k * k) * std::comp_ellint_1(k));
-}
-
-// The same as a table over t in [0, kDiscReach]; beyond, 1/t is right to 1 %.
-constexpr int kDiscCells = 1024;
-const std::array<float, kDiscCells + 1>& disc_table() {
-  static const auto table = [] {
-    std::array<float, kDiscCells + 1> values{};
-    for (int i = 0; i <= kDiscCells; ++i) {
-      // The singularity of K at t = 1 cancels; stay off it.
-      const double t = static_cast<double>(Kernel::kDiscReach) * i / kDiscCells;
-      values[static_cast<std::size_t>(i)] =
-          static_cast<float>(mean_inverse_distance(std::abs(t - 1) < 1e-9 ? 1.0 : t));
-    }
-    return values;
-  }();
-  return table;
-}
-
 float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 }  // namespace
@@ -40,19 +16,18 @@ float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 Kernel::Kernel(const std::array<Profile, 3>& profiles) {
   double narrowest = 1e30, widest = 0;
   for (const Profile& p : profiles) {
-    singular_ = singular_ || p.singular();
     if (p.total <= 0) continue;
     narrowest = std::min(narrowest, p.width);
-    // Beyond 80 decay lengths exp underflows what a float can hold next to the centre's value; without
+    // Beyond 104 decay lengths exp underflows what a float can hold next to the centre's value; without
     // absorption R falls like r^-3 and what lies beyond 1e6 widths is some 1e-6 of the total.
     for (const Profile::Term& t : p.terms) {
       steepest_ = std::max(steepest_, t.sigma);
-      widest = std::max(widest, t.sigma > 0 ? std::min(80 / t.sigma, 1e6 * p.width) : 1e6 * p.width);
+      widest = std::max(widest, t.sigma > 0 ? std::min(104 / t.sigma, 1e6 * p.width) : 1e6 * p.width);
     }
   }
   if (widest == 0) narrowest = widest = 1;
-  // The start is so near that a regular profile is flat there to the accuracy of the table.
-  const double start = narrowest * (singular_ ? 0x1p-24 : 0x1p-10);
+  // The start is so near that a bounded profile is flat there to the accuracy of the table.
+  const double start = narrowest * 0x1p-10;
   const std::uint32_t first = bits(static_cast<float>(std::max(start * start, 1e-36))) >> 23;
   const std::uint32_t last = bits(static_cast<float>(std::min(widest * widest, 1e36))) >> 23;
 
@@ -165,13 +140,8 @@ KernelTables Kernel::tables() const noexcept {
                        : reinterpret_cast<const float*>(cell_middles_.data()),
           interpolated ? reinterpret_cast<const float*>(jets_.data())
                        : reinterpret_cast<const float*>(jet_middles_.data()),
-          interpolated,
-          bins(first_cell_, cells_.size(), 23 - kCellBits),
-          bins(first_jet_, jets_.size(), 23 - kJetBits),
-          singular_,
-          disc_table().data(),
-          static_cast<float>(kDiscCells) / kDiscReach,
-          kDiscReach};
+          interpolated, bins(first_cell_, cells_.size(), 23 - kCellBits),
+          bins(first_jet_, jets_.size(), 23 - kJetBits)};
 }
 
 void Kernel::make_middles() {
@@ -200,18 +170,6 @@ double Kernel::relative_error(float distance) const noexcept {
 // They fall by up to four powers of r more.
 double Kernel::relative_error_of_jets(float distance) const noexcept {
   return error_of_chords(kJetBits, (7 + std::min(steepest_ * double{distance}, 80.0)) / 2);
-}
-
-Float4 Kernel::eval_disc(float r2, float area) const noexcept {
-  if (!(r2 < disc_reach2(area))) return eval(r2);
-  const float radius = std::sqrt(area / kPi);
-  // R(r) r is smooth; it is taken at the distance whose inverse is the mean inverse distance.
-  const float t = std::sqrt(r2) / radius * (static_cast<float>(kDiscCells) / kDiscReach);
-  const auto cell = std::min(static_cast<std::size_t>(t), static_cast<std::size_t>(kDiscCells - 1));
-  const float fraction = t - static_cast<float>(cell);
-  const auto& table = disc_table();
-  const float effective = radius / (table[cell] + fraction * (table[cell + 1] - table[cell]));
-  return eval(effective * effective);
 }
 
 }  // namespace nacre

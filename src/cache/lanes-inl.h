@@ -99,7 +99,7 @@ enum NodeField {
   kNodeTint
 };
 // And of a SumSource.
-enum SourceField { kSourceX, kSourceY, kSourceZ, kSourceArea, kSourcePower };
+enum SourceField { kSourceX, kSourceY, kSourceZ };
 
 HWY_INLINE void append(IndexList& list, std::uint32_t* room, hn::Vec<U> index, hn::Mask<F> mask) {
   const U du;

@@ -37,14 +37,14 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
         hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(node(kNodeTint), to_bend)));
     const VF point_error = hn::MulAdd(spread, to_bend, hn::Mul(lean, to_lean));
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
-    auto apart = hn::And(lit, hn::Gt(to_rim, hn::Set(df, test.nearest)));
+    auto apart = hn::And(lit, hn::Gt(to_rim, hn::Zero(df)));
     apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
     const auto far = hn::And(apart, hn::Le(series_error, limit(kInSeries, row)));
     const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, limit(kAsPoint, row))));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
     const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
-    const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Set(df, test.nearest))),
-                                   hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
+    const auto scattered =
+        hn::And(hn::And(rest, hn::Gt(to_rim, hn::Zero(df))), hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
         test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
@@ -69,12 +69,12 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
     const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
     const auto far =
-        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Set(df, test.nearest))),
+        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Zero(df))),
                 hn::Ge(hn::GatherIndex(df, test.limits + kInSeries, hn::ShiftLeft<2>(bin)), hn::Zero(df)));
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
     near.reserve(lanes);
     const auto here = hn::AndNot(far, batch.valid);
-    const VF values[] = {x, y, z, source(kSourceArea)};
+    const VF values[] = {x, y, z};
     for (int f = 0; f < SourceList::kFieldCount; ++f)
       hn::CompressStore(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
     HWY_ALIGN std::uint32_t which[hn::MaxLanes(df)];
@@ -116,7 +116,7 @@ void SourceList::reserve(std::size_t count) {
 
 void SourceList::add(const SumSource& source) {
   reserve(1);
-  const std::array<float, kFieldCount> values{source.x, source.y, source.z, source.area};
+  const std::array<float, kFieldCount> values{source.x, source.y, source.z};
   for (std::size_t f = 0; f < kFieldCount; ++f) fields_[f][size_] = values[f];
   powers_[size_] = source.power;
   ++size_;

@@ -35,25 +35,6 @@ struct Rows {
   }
 };
 
-// The squared distance at which a singular kernel has its average over a sample's disc.
-HWY_INLINE VF disc_distance2(const KernelTables& kernel, VF r2, VF area) {
-  const F df;
-  const I di;
-  const VF radius2 = hn::Mul(area, hn::Set(df, 1 / kPi));
-  const auto inside = hn::Lt(r2, hn::Mul(radius2, hn::Set(df, square(kernel.disc_reach))));
-  if (hn::AllFalse(df, inside)) return r2;
-  const VF radius = hn::Sqrt(radius2);
-  const VF t = hn::IfThenElseZero(
-      inside, hn::Mul(hn::Div(hn::Sqrt(r2), radius), hn::Set(df, kernel.discs_per_radius)));
-  const VI cell =
-      hn::Min(hn::ConvertTo(di, t),
-              hn::Set(di, static_cast<std::int32_t>(kernel.discs_per_radius * kernel.disc_reach) - 1));
-  const VF low = hn::GatherIndex(df, kernel.discs, cell), high = hn::GatherIndex(df, kernel.discs + 1, cell);
-  const VF effective =
-      hn::Div(radius, hn::MulAdd(hn::Sub(t, hn::ConvertTo(df, cell)), hn::Sub(high, low), low));
-  return hn::IfThenElse(inside, hn::Mul(effective, effective), r2);
-}
-
 template <bool kInterpolated>
 HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, const Vec3& x,
                          std::array<double, 3>& total) {
@@ -69,9 +50,8 @@ HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, con
     for (std::size_t i = 0; i < size; i += lanes) {
       const auto load = [&](SourceList::Field f)
                             HWY_ATTR { return hn::LoadU(df, list.field(f) + begin + i); };
-      VF r2 = length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
-                      hn::Sub(load(SourceList::kZ), cz));
-      if (kernel.singular) r2 = disc_distance2(kernel, r2, load(SourceList::kArea));
+      const VF r2 = length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
+                            hn::Sub(load(SourceList::kZ), cz));
       rows.find(i, kernel.cell_bins, r2);
     }
     Float4 sums[kSums] = {};
@@ -202,8 +182,8 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest&
     append(lists.opened, lists.opened.room(lanes), batch.index, open);
     const auto taken = hn::AndNot(open, batch.valid);
     added += hn::CountTrue(df, taken);
-    const VF distance = test.certified ? hn::Add(hn::Add(r, radius), hn::Set(df, test.slack))
-                                       : hn::Max(hn::Max(r, radius), hn::Set(df, test.slack));
+    const VF distance =
+        test.certified ? hn::Add(hn::Add(r, radius), hn::Set(df, test.slack)) : hn::Max(r, radius);
     const VF r2 = hn::Mul(distance, distance);
     const VI row = hn::ShiftLeft<2 + kInterpolated>(find_cell(kernel.cell_bins, r2));
     for (int k = 0; k < 3; ++k) {

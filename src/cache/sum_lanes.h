@@ -23,7 +23,7 @@ class SourceList {
   /// Has to be called between the last `add` and a sum.
   void pad();
 
-  enum Field { kX, kY, kZ, kArea, kFieldCount };
+  enum Field { kX, kY, kZ, kFieldCount };
   const float* field(Field f) const noexcept { return fields_[f].data(); }
   float* field(Field f) noexcept { return fields_[f].data(); }
   const Float4* powers() const noexcept { return powers_.data(); }
@@ -87,7 +87,6 @@ struct NodeTest {
   const SumNode* nodes;
   Vec3 centre;          // of the target
   float radius;         // of a ball around all its points
-  float nearest;        // within this distance samples are summed one by one
   bool open_small;      // whether nodes smaller than the target are opened rather than left to its parts
   bool certified;       // whether distances are to the nearest that a sample of the node may be
   float ratio;          // the largest of a node's radius to its distance
@@ -102,7 +101,7 @@ struct CoarseTest {
   Vec3 centre;
   float ratio;     // of radius to distance above which nodes with children are opened
   bool certified;  // whether samples are as far away as can be
-  float slack;     // then: how much further; else the least distance
+  float slack;     // then: how much further
 };
 
 /// Where the nodes of `work` belong: `far`, a series is good enough; `points`, a point is; `scattered`, it is

@@ -45,11 +45,10 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
     single_.emplace(world, medium);
 }
 
-// Where R_d has no bound, or samples are further apart than a mean free path, M_o has detail at every sample;
-// and where a body has so many mean free paths that nodes would fill the memory, pixels are fewer.
+// Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
+// so many mean free paths that nodes would fill the memory, pixels are fewer.
 void Translucency::make_field(const CacheGroup& group, double tolerance) {
   const Medium& m = world_.scene->media[medium_];
-  if (m.profile == ProfileKind::kNormalized) return;
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);

@@ -13,9 +13,10 @@ namespace {
 
 using namespace testing_support;
 
-Medium marble() {
+Medium marble(ProfileKind profile = ProfileKind::kDipole) {
   Medium medium = make_medium(*find_preset("Marble"));
   medium.scale = 1;
+  medium.profile = profile;
   return medium;
 }
 constexpr int kBlue = 2;
@@ -26,7 +27,7 @@ enum class Areas { kShares, kEqual };
 // Standard deviation over mean of M_o at `probes`, on a surface where E_t = 1 everywhere and the samples'
 // spacing is `spacing` mean free paths.
 double measure_blotch(const GroupSurface& surface, double spacing, const std::vector<Vec3>& probes,
-                      Areas areas = Areas::kShares) {
+                      Areas areas = Areas::kShares, ProfileKind profile = ProfileKind::kDipole) {
   const double area = surface.areas.total();
   const auto points = place(surface, 2 / std::sqrt(3.0) * area / square(spacing * mean_free_path()));
   SurfaceSamples samples;
@@ -41,7 +42,7 @@ double measure_blotch(const GroupSurface& surface, double spacing, const std::ve
   samples.irradiance.assign(points.size(), Rgb(1, 1, 1));
   std::vector<std::shared_ptr<const void>> storage;
   const CacheGroup group = build_group("test", area, samples, storage);
-  const Exitance exitance(group, marble(), 0);
+  const Exitance exitance(group, marble(profile), 0);
   std::uint64_t evaluations = 0;
   double sum = 0, sum2 = 0;
   std::vector<Rgb> values(probes.size());
@@ -71,6 +72,15 @@ GroupSurface plane() { return make_surface({placed(make_rectangle(), kHalfSide, 
 
 TEST(Blotch, PlaneAtTheDefaultSpacing) {
   EXPECT_LE(measure_blotch(plane(), 0.65, middle_of_plane(800)), 0.005);
+}
+
+// A profile without bound is bounded so that it is no worse.
+TEST(Blotch, IsThatOfEveryProfile) {
+  for (const ProfileKind profile : {ProfileKind::kBetterDipole, ProfileKind::kNormalized})
+    for (const double spacing : {0.65, 1.3})
+      EXPECT_LE(measure_blotch(plane(), spacing, middle_of_plane(400), Areas::kShares, profile),
+                1.5 * predict_blotch(spacing))
+          << static_cast<int>(profile) << " " << spacing << " " << predict_blotch(spacing);
 }
 
 TEST(Blotch, SliversAtTheDefaultSpacing) {

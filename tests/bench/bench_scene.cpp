@@ -32,7 +32,25 @@ std::vector<BenchScene> bench_scenes() {
   const std::vector<std::string> both{"lit from behind", "lit from the front"};
   return {{"bunny50", "marble bunny 50 mm", "marble_bunny.xml", 50, both},
           {"bunny15", "marble bunny 15 mm", "marble_bunny.xml", 15, both},
-          {"dragon", "jade dragon", "jade_dragon.xml", std::nullopt, {"lit from behind"}}};
+          {"dragon", "jade dragon", "jade_dragon.xml", std::nullopt, {"lit from behind"}},
+          {"better",
+           "marble bunny 50 mm, better dipole",
+           "marble_bunny.xml",
+           50,
+           {"lit from behind"},
+           ProfileKind::kBetterDipole},
+          {"normalized",
+           "marble bunny 50 mm, normalized",
+           "marble_bunny.xml",
+           50,
+           {"lit from behind"},
+           ProfileKind::kNormalized},
+          {"normalized_dragon",
+           "jade dragon, normalized",
+           "jade_dragon.xml",
+           std::nullopt,
+           {"lit from behind"},
+           ProfileKind::kNormalized}};
 }
 
 Scene load_bench_scene(const BenchScene& spec) {
@@ -40,6 +58,7 @@ Scene load_bench_scene(const BenchScene& spec) {
   const Box3 box = object_bounds(scene);
   if (spec.height_mm)
     for (Medium& medium : scene.media) medium.scale = static_cast<float>(*spec.height_mm / box.size().y);
+  for (Medium& medium : scene.media) medium.profile = spec.profile;
   const Camera camera = scene.cameras[0];
   scene.cameras.clear();
   for (std::size_t view = 0; view < spec.views.size(); ++view)

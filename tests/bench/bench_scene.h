@@ -18,6 +18,7 @@ struct BenchScene {
   std::string file;   // in scenes/
   std::optional<double> height_mm;
   std::vector<std::string> views;  // the file's camera, then the opposite one
+  ProfileKind profile = ProfileKind::kDipole;
 };
 std::vector<BenchScene> bench_scenes();
 

@@ -14,7 +14,7 @@ constexpr const char* kUsage =
     "Times diffusion against primary rays and measures its error. The tables go to standard output.\n"
     "  --quick      one view of one scene at 256x256, one run: a smoke test\n"
     "  --full       a cache of 10 million samples, too\n"
-    "  --only NAME  bunny50, bunny15, dragon or growth\n"
+    "  --only NAME  bunny50, bunny15, dragon, better, normalized, normalized_dragon or growth\n"
     "  -o FILE      where to write the figures as JSON (default: bench.json)\n";
 
 struct Options {

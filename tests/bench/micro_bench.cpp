@@ -38,22 +38,11 @@ std::vector<float> make_distances() {
 }
 
 void eval_kernel(benchmark::State& state, const Medium& medium) {
-  const Kernel kernel(make_profiles(medium));
+  const Kernel kernel(resolve_profiles(make_profiles(medium), 0.01));
   const std::vector<float> distances = make_distances();
   for (auto _ : state) {
     Float4 sum{};
     for (const float r2 : distances) sum = sum + kernel.eval(r2);
-    benchmark::DoNotOptimize(sum);
-  }
-  count_each(state, "per_evaluation", static_cast<double>(state.iterations()) * kDistances);
-}
-
-void eval_disc(benchmark::State& state) {
-  const Kernel kernel(make_profiles(normalized_marble()));
-  const std::vector<float> distances = make_distances();
-  for (auto _ : state) {
-    Float4 sum{};
-    for (const float r2 : distances) sum = sum + kernel.eval_disc(r2, 1e-4f);
     benchmark::DoNotOptimize(sum);
   }
   count_each(state, "per_evaluation", static_cast<double>(state.iterations()) * kDistances);
@@ -70,7 +59,7 @@ class ChosenTarget {
 
 void add_sources(benchmark::State& state, const std::string& target, const Medium& medium) {
   const ChosenTarget chosen(target);
-  const Kernel kernel(make_profiles(medium));
+  const Kernel kernel(resolve_profiles(make_profiles(medium), 0.01));
   std::vector<SumSource> sources(kSources);
   Rng rng(6);
   for (SumSource& source : sources)
@@ -125,7 +114,6 @@ void build_octree(benchmark::State& state) {
 void register_benchmarks() {
   using benchmark::RegisterBenchmark;
   RegisterBenchmark("kernel/eval", [](benchmark::State& state) { eval_kernel(state, marble()); });
-  RegisterBenchmark("kernel/eval_disc", eval_disc);
   for (const std::string& target : simd_targets()) {
     RegisterBenchmark(("add_sources/dipole/" + target).c_str(),
                       [target](benchmark::State& state) { add_sources(state, target, marble()); });

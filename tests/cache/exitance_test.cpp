@@ -25,31 +25,18 @@ Rgb eval(const Exitance& exitance, const Vec3& x) {
   return eval(exitance, {&x, 1}, evaluations)[0];
 }
 
-// The sum that M_o is, in double precision from the closed forms. Singular profiles are averaged over a
-// sample's share as Kernel::eval_disc does it: R(r) r is smooth, so R is taken at the distance whose inverse
-// is the mean inverse distance, here integrated in polar coordinates around the point.
-double mean_inverse_distance(double x, double radius) {
-  constexpr int kAngles = 4000;
-  double sum = 0;  // of chord lengths: the integral of r dr / r along each ray
-  for (int a = 0; a < kAngles; ++a) {
-    const double phi = 2 * kPiD * (a + 0.5) / kAngles, along = x * std::cos(phi);
-    const double root = radius * radius - square(x * std::sin(phi));
-    if (root > 0) sum += std::max(0.0, along + std::sqrt(root)) - std::max(0.0, along - std::sqrt(root));
-  }
-  return sum * (2 * kPiD / kAngles) / (kPiD * radius * radius);
-}
-
+// The sum that M_o is, in double precision from the closed forms.
 std::array<double, 3> reference(const SurfaceSamples& samples, const Medium& medium, const Vec3& x) {
-  const auto profiles = make_profiles(medium);
+  double area = 0;
+  for (const float a : samples.areas) area += double{a};
+  const auto profiles =
+      resolve_profiles(make_profiles(medium), hexagonal_spacing(area, static_cast<double>(samples.size())));
   std::array<double, 3> sum{};
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto area = static_cast<double>(samples.areas[i]);
-    double r = (Vec3d(x) - Vec3d(samples.positions[i])).length();
-    const double radius = std::sqrt(area / kPiD);
-    if (profiles[0].singular() && r < 4 * radius) r = 1 / mean_inverse_distance(r, radius);
+    const double r = (Vec3d(x) - Vec3d(samples.positions[i])).length();
     for (std::size_t k = 0; k < 3; ++k)
-      sum[k] += eval_profile(profiles[k], r) * area *
-                static_cast<double>(samples.irradiance[i][static_cast<int>(k)]);
+      sum[k] += eval_profile(profiles[k], r) * double{samples.areas[i]} *
+                double{samples.irradiance[i][static_cast<int>(k)]};
   }
   return sum;
 }
@@ -107,7 +94,7 @@ TEST_P(EveryKind, ZeroToleranceIsTheExactSumBitForBit) {
   }
 }
 
-// Table, float arithmetic and all: 1e-5, and 2e-4 where a table over discs stands for elliptic integrals.
+// Table, float arithmetic and all.
 TEST_P(EveryKind, ExactSumIsTheClosedForm) {
   for (const char* preset : {"Marble", "Spectralon", "Skin1"})
     for (const Shape& shape : kShapes) {
@@ -115,7 +102,7 @@ TEST_P(EveryKind, ExactSumIsTheClosedForm) {
       const OwnedGroup owned = make_group(samples);
       const Medium medium = make_material(preset, GetParam(), default_scale(preset, samples));
       const Exitance exitance(owned.group, medium, 0);
-      const double bound = GetParam() == ProfileKind::kNormalized ? 2e-4 : 1e-5;
+      const double bound = 1e-5;
       Rng rng(4);
       for (int i = 0; i < 8; ++i) {
         const Vec3 x = shape.point(rng);
@@ -286,10 +273,7 @@ TEST_P(EveryKind, LargePlaneUnderUniformLightGivesTheTotal) {
     const int n = 400;
     const SurfaceSamples samples = make_plane(n, &uniform_light);
     const OwnedGroup owned = make_group(samples);
-    // A disc at the mean inverse distance stands for a sample's share only while the share is small against
-    // the profile's width, which absorption narrows: finer for the singular profile.
-    const float finer = GetParam() == ProfileKind::kNormalized ? 0.3f : 0.8f;
-    const Medium medium = make_material(preset, GetParam(), finer * default_scale(preset, samples));
+    const Medium medium = make_material(preset, GetParam(), 0.8f * default_scale(preset, samples));
     const auto profiles = make_profiles(medium);
     const Exitance exact(owned.group, medium, 0);
     double mean[3]{};

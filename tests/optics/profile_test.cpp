@@ -95,6 +95,41 @@ TEST_P(EveryProfile, Decreases) {
   }
 }
 
+// Bounded for samples at some distance: the same integral, the same far away, and nowhere narrower than
+// samples are apart.
+TEST(Resolved, KeepsItsTotalAndItsTail) {
+  for (const double sigma_a : {0.0, 0.02, 1.0, 20.0})
+    for (const double spacing : {1e-3, 0.05, 0.3, 3.0, 50.0}) {
+      const Profile p = make_normalized_diffusion(2.19, sigma_a, 1.4), r = resolve_profile(p, spacing);
+      EXPECT_FALSE(r.singular());
+      EXPECT_TRUE(std::isfinite(eval_profile(r, 0)) && eval_profile(r, 0) > 0);
+      EXPECT_NEAR(integrate_plane(r) / p.total, 1, 1e-5) << sigma_a << " " << spacing;
+      const double sigma = p.terms[0].sigma;
+      if (spacing * sigma < 0.1) {
+        for (const double far : {5.0, 10.0, 40.0})
+          EXPECT_NEAR(eval_profile(r, far * spacing) / eval_profile(p, far * spacing), 1,
+                      2 / square(far) + 2 * sigma * spacing / far)
+              << sigma_a << " " << spacing << " " << far;
+      }
+      // Mean square of a coordinate, by the same integral as the total.
+      double second = 0;
+      for (double x = std::log(spacing) - 12; x < std::log(spacing) + 14; x += 1e-3)
+        second += eval_profile(r, std::exp(x)) * kPiD * std::exp(4 * x) * 1e-3;
+      // Beyond the range of exponents the limit is in decay lengths.
+      if (spacing * sigma < 20) {
+        EXPECT_GT(std::sqrt(second / p.total), 0.55 * spacing) << sigma_a << " " << spacing;
+      }
+    }
+}
+
+TEST(Resolved, LeavesBoundedProfilesAlone) {
+  for (const Profile& p : {make_dipole(2, 0.1, 1.3), make_better_dipole(2, 0.1, 1.3)})
+    for (const double r : {0.0, 0.1, 3.0}) {
+      EXPECT_EQ(eval_profile(resolve_profile(p, 0.7), r), eval_profile(p, r));
+      EXPECT_EQ(resolve_profile(p, 0.7).total, p.total);
+    }
+}
+
 TEST(Presets, ReproduceTheTabulatedReflectance) {
   int compared = 0;
   for (const Preset& preset : presets()) {

@@ -15,8 +15,8 @@ namespace nacre {
 
 /// A sample, or a node that stands for its samples, as the inner loops read it.
 struct SumSource {
-  float x, y, z, area;  // share of the surface, 0 for a node
-  Float4 power;         // E_t A
+  float x, y, z, spare;
+  Float4 power;  // E_t A
 };
 /// A node of the octree as they do. Second moments are those of E_t A over its sum, halved, about x, y, z.
 struct SumNode {
@@ -109,12 +109,11 @@ class Exitance {
   const CacheGroup& group_;
   LargeArray<SumSource> sources_;
   LargeArray<SumNode> nodes_;
+  double spacing_;  // distance of samples
   Kernel kernel_;
   Promise promise_;
   double allowance_;
   float moment_slack_ = 1e-5f;  // what rounding and tables may take from second moments
-  float nearest_ = 0;           // distance within which samples are summed one by one
-  double spacing_ = 1;          // distance of samples
   Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1, cells_per_unit_ = 1;
   DistanceBins bins_{};

@@ -24,10 +24,6 @@ struct KernelTables {
   const float *cells, *jets;
   bool interpolated;
   DistanceBins cell_bins, jet_bins;
-  bool singular;
-  const float* discs;  // mean of 1/|x - y| over the unit disc, by distance of x from its centre
-  float discs_per_radius;
-  float disc_reach;  // radii of a disc within which it differs from a point
 };
 
 /// R_d and its envelopes, indexed by the bits of r^2 as a float: octaves of r^2, each cut into equal cells.
@@ -35,27 +31,19 @@ struct KernelTables {
 /// like r^-3), and to 1.5e-4 of the value up to sigma_tr r = 15; it never errs below.
 class Kernel {
  public:
-  /// Radii of a disc within which it differs from a point.
-  static constexpr float kDiscReach = 4;
-
+  /// The profiles have to be bounded (resolve_profile).
   explicit Kernel(const std::array<Profile, 3>& profiles);
 
-  /// R_d at squared distance `r2`. For a singular profile not nearer than the table's start.
+  /// R_d at squared distance `r2`.
   Float4 eval(float r2) const noexcept {
     const Cell& cell = cells_[index(r2)];
     return cell.value + broadcast(static_cast<float>(bits(r2) & kFractionMask) * kFractionScale) * cell.delta;
   }
-  /// Average of R_d over a disc of area `area` at squared distance `r2` from its centre, for singular
-  /// profiles (R_d of the others hardly varies over a sample's share).
-  Float4 eval_disc(float r2, float area) const noexcept;
   /// The largest relative error of `eval` up to a distance, which linear interpolation makes where the
   /// profile falls like exp(-sigma_tr r) within a cell.
   double relative_error(float distance) const noexcept;
   /// The same of the derivatives in `eval_jet`.
   double relative_error_of_jets(float distance) const noexcept;
-  /// Squared distance beyond which a disc of that area counts as a point: eval_disc equals eval there.
-  static float disc_reach2(float area) noexcept { return kDiscReach * kDiscReach * (area / kPi); }
-  bool singular() const noexcept { return singular_; }
   /// With linear interpolation; or without, where `middles` were made: then R errs by up to 0.3 % and its
   /// derivatives by up to 3 %, each way alike, which sums of many terms hardly show.
   KernelTables tables() const noexcept;
@@ -124,7 +112,6 @@ class Kernel {
   std::vector<JetCell> jets_;
   std::vector<Float4> cell_middles_, jet_middles_;
   std::uint32_t first_cell_ = 0, first_bound_ = 0, first_jet_ = 0;
-  bool singular_ = false;
   double steepest_ = 0;  // largest sigma of a profile's exponentials
 };
 

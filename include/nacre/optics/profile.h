@@ -16,9 +16,9 @@ struct Profile {
   };
   std::array<Term, 2> terms;
   double total = 0;  // integral of R over the plane: diffuse reflectance of a half-space
-  double width = 1;  // length over which R changes near r = 0: z_r, or l for a profile singular there
+  double width = 1;  // length over which R changes near r = 0: z_r, or l / s for a profile singular there
 
-  /// True if R grows like 1/r at 0: a sum over samples then has to average it over each sample's own area.
+  /// True if R grows like 1/r at 0, where no sum over samples can follow it: see resolve_profile.
   bool singular() const { return terms[0].z == 0; }
 };
 
@@ -37,6 +37,13 @@ Profile make_better_dipole(double sigma_s_prime, double sigma_a, double eta);
 /// Normalized diffusion, searchlight form, albedo = the dipole's total and l = 1/sigma_t'. It contains single
 /// scattering. Source: Christensen & Burley 2015.
 Profile make_normalized_diffusion(double sigma_s_prime, double sigma_a, double eta);
+
+/// The profile as samples `spacing` apart can carry it. One that is singular is bounded by moving its source
+/// off the surface by about that distance; what that takes from its total is given back nearby. The total is
+/// kept, what is further away than a few spacings changes in second order, and the sum over samples is smooth
+/// however far they are apart. Other profiles are left alone.
+Profile resolve_profile(const Profile& profile, double spacing);
+std::array<Profile, 3> resolve_profiles(std::array<Profile, 3> profiles, double spacing);
 
 /// The medium's own profile, r, g, b, in scene units (coefficients times scale).
 std::array<Profile, 3> make_profiles(const Medium& medium);
