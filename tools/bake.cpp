@@ -10,13 +10,16 @@ struct Options {
   SceneOptions scene;
   BakeOptions bake;
   std::string output;
+  bool per_light = false, fixed_eta = false;
 };
 
 void run(const Options& options, const std::string& command_line) {
   Session session(options.common, command_line);
   check_writable(options.output, {options.scene.path});
   const Scene scene = load_scene(options.scene, session);
-  const BakeParams params = options.bake.params(options.common);
+  BakeParams params = options.bake.params(options.common);
+  params.per_light = options.per_light;
+  params.fixed_eta = options.fixed_eta;
   plan_bake(scene, params);  // refuses absurd sizes before anything is built
   const World world = [&] {
     const StageTimer timer(session.report(), "build_bvh");
@@ -39,6 +42,10 @@ void add_bake_command(CLI::App& app, const std::string& command_line) {
       app.add_subcommand("bake", "Bake the irradiance on translucent surfaces into a cache file");
   add_scene_options(*command, options->scene);
   command->add_option("-o,--output", options->output, "Cache file to write")->required();
+  command->add_flag("--per-light", options->per_light,
+                    "Keep what each light, or group of lights, sends apart, for `nacre render --light`");
+  command->add_flag("--fixed-eta", options->fixed_eta,
+                    "Leave out what serves other indices of refraction: 30 bytes less a sample");
   add_bake_options(*command, options->bake);
   add_common_options(*command, options->common);
   command->callback([options, command_line] { run(*options, command_line); });

@@ -147,6 +147,12 @@ void add_bake_options(CLI::App& command, BakeOptions& options) {
           "--bounces", options.bounces,
           "Bounces of light off opaque surfaces before it enters (default: as the scene's integrator)")
       ->check(CLI::Range(0, 1000));
+  command
+      .add_option("--irradiance-error", options.irradiance_error,
+                  "Refine samples whose relative standard error is above this, with up to 64 times as many "
+                  "connections")
+      ->check(CLI::Range(1e-4, 1.0))
+      ->check(finite_number());
   command.add_flag("--interreflect", options.interreflect,
                    "Add light that translucent objects send to themselves and each other; the cache then "
                    "holds for these materials only");
@@ -161,6 +167,7 @@ BakeParams BakeOptions::params(const CommonOptions& common) const {
   result.bounces = bounces;
   result.shadows = !no_shadows;
   result.interreflect = interreflect;
+  result.irradiance_error = irradiance_error.value_or(0);
   result.seed = common.seed;
   return result;
 }

@@ -67,8 +67,11 @@ Scene load_scene(const SceneOptions& options, Session& session);
 struct BakeOptions {
   std::optional<double> points, spacing;
   std::optional<int> irradiance_samples, bounces;
+  std::optional<double> irradiance_error;
   bool no_shadows = false, interreflect = false;
-  bool any_but_shadows() const { return points || spacing || irradiance_samples || bounces || interreflect; }
+  bool any_but_shadows() const {
+    return points || spacing || irradiance_samples || bounces || interreflect || irradiance_error;
+  }
   BakeParams params(const CommonOptions& common) const;
 };
 void add_bake_options(CLI::App& command, BakeOptions& options);

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "cached_light.h"
 #include "common.h"
 #include "nacre/base/version.h"
 #include "nacre/cache/blotch.h"
@@ -19,7 +20,7 @@ struct Options {
   SceneOptions scene;
   BakeOptions bake;
   std::string output, cache, exitance, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
-  std::vector<std::string> cameras;
+  std::vector<std::string> cameras, lights;
   int samples_per_pixel = 0;
   std::optional<double> tolerance;
   std::optional<int> single_samples, mc_samples;
@@ -104,40 +105,6 @@ RenderParams make_params(const Options& options, const Scene& scene, const std::
   return params;
 }
 
-Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows, Report& report) {
-  const StageTimer timer(report, "read_cache");
-  Cache cache = load_cache(path);
-  const auto bounces = fingerprint_bounces(cache.fingerprint, scene.media.size());
-  const std::string mismatch = describe_mismatch(
-      cache.fingerprint,
-      make_fingerprint(scene, bounces, shadows, fingerprint_interreflects(cache.fingerprint)));
-  if (!mismatch.empty() || cache.groups.size() != scene.media.size())
-    fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
-         mismatch.empty() ? "the number of translucent groups differs" : mismatch);
-  return cache;
-}
-
-// Says where a material is too fine-grained for the cache, and what would serve.
-Warnings check_density(const Scene& scene, const Cache& cache) {
-  Warnings warnings;
-  for (std::size_t m = 0; m < scene.media.size(); ++m) {
-    const Medium& medium = scene.media[m];
-    if (medium.lambert) continue;  // uses no samples
-    const CacheGroup& group = cache.groups[m];
-    const double spacing =
-        hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * medium.scale;
-    const double length = smallest_mean_free_path(medium);
-    const double blotch = predict_blotch(spacing / length);
-    if (blotch > kAcceptableBlotch)
-      warnings.push_back(
-          fmt::format("{}: the samples of {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
-                      "blotches of {:.1f} %; --spacing {:.3g} would serve",
-                      medium.place, medium_label(scene, m), spacing, spacing / length, 100 * blotch,
-                      kDefaultSpacing * length));
-  }
-  return warnings;
-}
-
 std::optional<double> parse_exposure(const std::string& text) {
   if (text == "auto") return std::nullopt;
   double value = 0;
@@ -152,14 +119,15 @@ void check_combination(const Options& options) {
   const Method method = method_of(options);
   if (!options.cache.empty() && options.bake.any_but_shadows())
     throw UsageError(
-        "--points, --spacing, --irradiance-samples, --bounces and --interreflect are for baking; --cache is "
+        "--points, --spacing, --irradiance-samples, --irradiance-error, --bounces and --interreflect are for "
+        "baking; --cache is "
         "baked already");
   const bool samples_cache = options.bake.points || options.bake.spacing || options.bake.irradiance_samples ||
-                             options.bake.interreflect;
+                             options.bake.interreflect || options.bake.irradiance_error;
   if (!uses_cache(method) && (!options.cache.empty() || samples_cache))
     throw UsageError(
         fmt::format("--method {} uses no cache: leave out --cache, --points, --spacing, "
-                    "--irradiance-samples and --interreflect",
+                    "--irradiance-samples, --irradiance-error and --interreflect",
                     options.method));
   if ((options.mc_samples || options.mc_sampling) && method != Method::kMonteCarlo)
     throw UsageError("--mc-samples and --mc-sampling go with --method montecarlo");
@@ -196,18 +164,16 @@ Warnings check_single_scattering(const Scene& scene, const Options& options) {
 
 // What the picture is made from where a cache is used, else an empty one that still says what it would have
 // depended on.
-Cache make_cache(const Options& options, const RenderParams& params, const World& world,
-                 const BakeParams& bake_params, Session& session) {
+Cache make_cache(const RenderParams& params, const World& world, const BakeParams& bake_params,
+                 Session& session) {
   const Scene& scene = *world.scene;
   if (scene.media.empty()) return {};
-  if (!options.cache.empty())
-    return load_matching_cache(options.cache, scene, bake_params.shadows, session.report());
   if (uses_cache(params.method)) return run_bake(world, bake_params, session);
-  std::vector<int> bounces;
+  BakeConditions conditions{{}, bake_params.shadows};
   for (std::size_t m = 0; m < scene.media.size(); ++m)
-    bounces.push_back(irradiance_bounces(scene, m, params.bounces));
+    conditions.bounces.push_back(irradiance_bounces(scene, m, params.bounces));
   Cache cache;
-  cache.fingerprint = make_fingerprint(scene, bounces, bake_params.shadows);
+  cache.fingerprint = make_fingerprint(scene, conditions);
   return cache;
 }
 
@@ -286,17 +252,23 @@ void run(const Options& options, const std::string& command_line) {
       !is_exitance_file(options.exitance))
     load_exitance(options.exitance);
 
-  const Scene scene = load_scene(options.scene, session);
+  Scene scene = load_scene(options.scene, session);
+  const std::vector<Rgb> light_scales = find_light_scales(scene, options.lights);
   std::vector<RenderParams> params;
   for (const Picture& picture : pictures) params.push_back(make_params(options, scene, picture.camera));
-  const BakeParams bake_params = options.bake.params(options.common);
+  BakeParams bake_params = options.bake.params(options.common);
+  bake_params.fixed_eta = true;  // what is not kept serves this scene alone
   session.warn(check_single_scattering(scene, options));
   if (cached && options.cache.empty() && !scene.media.empty()) plan_bake(scene, bake_params);
+  std::optional<Cache> baked;
+  if (!options.cache.empty() && !scene.media.empty())
+    baked = load_matching_cache(options.cache, scene, bake_params.shadows, light_scales, session.report());
+  scale_lights(scene, light_scales);
   const World world = [&] {
     const StageTimer timer(session.report(), "build_bvh");
     return make_world(scene, bake_params.shadows);
   }();
-  const Cache cache = make_cache(options, params[0], world, bake_params, session);
+  const Cache cache = baked ? *std::move(baked) : make_cache(params[0], world, bake_params, session);
   if (cached) session.warn(check_density(scene, cache));
 
   const Renderer renderer(world, cache, params[0], session.report());
@@ -365,6 +337,12 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
                    "Relative error of the hierarchical sum (default: 0.01)")
       ->check(CLI::Range(0.0, 1.0))
       ->check(finite_number());
+  command
+      ->add_option(
+          "--light", options->lights,
+          "ID=SCALE or ID=r,g,b: multiply what a light, or a group of them, sends; with a cache, one "
+          "that was baked --per-light")
+      ->take_all();
   command->add_option("--exitance", options->exitance,
                       "Keep the diffusion that is evaluated in this file, and take it from there next time");
   command->add_flag("--certified", options->certified,

@@ -7,6 +7,7 @@
 #include "bake/group_surface.h"
 #include "bake/placement.h"
 #include "bake/translucent_radiance.h"
+#include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "nacre/base/version.h"
 #include "nacre/cache/fingerprint.h"
@@ -18,8 +19,23 @@ namespace {
 
 // Rounds of light between translucent objects.
 constexpr int kInterreflections = 2;
-// Per sample in the file: ten planes and its part of the nodes, about one to five samples.
-constexpr double kBytesPerSample = 4.0 * static_cast<double>(kPlaneCount) + 64.0 / 3;
+// Per sample in the file: ten planes and its part of the nodes, about one to five samples; and for each plane
+// of light that there are several of its irradiance, then errors, then ratios.
+double bytes_per_sample(std::size_t lights, bool every_eta) {
+  const double of_light =
+      4 + (lights > 1 ? 12 : 0) + (every_eta ? static_cast<double>(sizeof(EtaRatios)) : 0);
+  return 4.0 * static_cast<double>(kPlaneCount) + 64.0 / 3 + static_cast<double>(lights) * of_light;
+}
+
+// Lights that are kept apart, by name; one without a name for all of them.
+std::vector<std::string> light_planes(const Scene& scene, bool per_light) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; per_light && i < scene.lights.size(); ++i)
+    if (const std::string name = light_plane_name(scene, i); std::ranges::find(names, name) == names.end())
+      names.push_back(name);
+  if (names.empty()) names.emplace_back();
+  return names;
+}
 
 std::vector<const Mesh*> group_meshes(const Scene& scene, std::size_t medium) {
   std::vector<const Mesh*> meshes;
@@ -149,7 +165,8 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
     group.spacing_mm = hexagonal_spacing(group.surface_area, group.points) * scene.media[m].scale;
     plan.points += group.points;
   }
-  plan.bytes = 4096 + plan.points * kBytesPerSample;
+  plan.bytes = 4096 + plan.points * bytes_per_sample(light_planes(scene, params.per_light).size(),
+                                                     keeps_every_eta(scene, params));
   if (!(plan.points <= kMostPoints))
     fail(ErrorCode::kLimit, scene.path,
          "the bake would need {:.3g} samples, more than {:.0f} million; check `scale` (mm per scene unit) or "
@@ -158,17 +175,98 @@ BakePlan plan_bake(const Scene& scene, const BakeParams& params) {
   return plan;
 }
 
+bool keeps_every_eta(const Scene& scene, const BakeParams& params) {
+  return !params.fixed_eta && !params.interreflect && std::ranges::all_of(scene.media, [](const Medium& m) {
+    return m.eta() >= kLeastEta && m.eta() <= kMostEta;
+  });
+}
+
 namespace {
 
 // Octrees over all groups; `storage` owns them.
-std::vector<CacheGroup> build_groups(const BakePlan& plan, std::span<const PlacedSamples> placed,
+std::vector<CacheGroup> build_groups(const BakePlan& plan, std::span<const double> areas,
+                                     std::vector<SurfaceSamples> samples,
                                      std::vector<std::shared_ptr<const void>>& storage, Report& report) {
   const StageTimer timer(report, "build_octree");
-  storage.clear();
   std::vector<CacheGroup> groups;
-  for (std::size_t m = 0; m < placed.size(); ++m)
-    groups.push_back(build_group(plan.groups[m].name, placed[m].surface_area, placed[m].samples, storage));
+  for (std::size_t m = 0; m < samples.size(); ++m)
+    groups.push_back(build_group(plan.groups[m].name, areas[m], std::move(samples[m]), storage));
   return groups;
+}
+
+// The world as it is with the lights of one name only.
+World with_lights_of(const World& world, const std::string& name) {
+  World only = world;
+  if (name.empty()) return only;
+  only.muted.resize(world.scene->lights.size());
+  for (std::size_t i = 0; i < only.muted.size(); ++i)
+    only.muted[i] = light_plane_name(*world.scene, i) != name;
+  return only;
+}
+
+// What the lights of a world send into each group.
+class Illumination {
+ public:
+  Illumination(const BakePlan& plan, const BakeParams& params, std::span<const PlacedSamples> placed,
+               Progress& progress, Report& report)
+      : plan_(plan), params_(params), placed_(placed), progress_(progress), report_(report) {}
+
+  std::vector<SampleLight> compute(const World& world) const {
+    std::vector<SampleLight> lights = compute_once(world, {});
+    for (int round = 0; params_.interreflect && round < kInterreflections; ++round) {
+      std::vector<std::shared_ptr<const void>> storage;
+      std::vector<SurfaceSamples> samples;
+      std::vector<double> areas;
+      for (std::size_t m = 0; m < placed_.size(); ++m) {
+        samples.push_back(placed_[m].samples);
+        samples[m].lights.clear();
+        samples[m].irradiance = std::move(lights[m].irradiance);
+        areas.push_back(placed_[m].surface_area);
+      }
+      const std::vector<CacheGroup> groups = build_groups(plan_, areas, std::move(samples), storage, report_);
+      const TranslucentRadiance radiance = [&] {
+        const StageTimer timer(report_, "diffusion");
+        return TranslucentRadiance(world, groups, progress_);
+      }();
+      lights = compute_once(world, std::cref(radiance));
+    }
+    return lights;
+  }
+
+ private:
+  std::vector<SampleLight> compute_once(const World& world, const TranslucentAnswer& answer) const {
+    const StageTimer timer(report_, "irradiance");
+    std::vector<SampleLight> lights;
+    for (std::size_t m = 0; m < placed_.size(); ++m) {
+      const PlacedSamples& placed = placed_[m];
+      lights.push_back(compute_irradiance(
+          world, {placed.samples.positions, placed.samples.normals, placed.extents, placed.albedos},
+          world.scene->media[m].eta(),
+          {plan_.groups[m].irradiance_samples, plan_.groups[m].bounces, params_.irradiance_error,
+           keeps_every_eta(*world.scene, params_), hash_words(params_.seed, m, 1)},
+          progress_, answer));
+    }
+    return lights;
+  }
+
+  const BakePlan& plan_;
+  const BakeParams& params_;
+  std::span<const PlacedSamples> placed_;
+  Progress& progress_;
+  Report& report_;
+};
+
+// The irradiance of samples from what their lights send.
+void add_up_lights(SurfaceSamples& samples) {
+  if (samples.lights.size() == 1) {
+    samples.irradiance = std::move(samples.lights[0].irradiance);
+    return;
+  }
+  samples.irradiance.assign(samples.size(), Rgb(0, 0, 0));
+  for (const SampleLight& light : samples.lights)
+    parallel_for(samples.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) samples.irradiance[i] += light.irradiance[i];
+    });
 }
 
 }  // namespace
@@ -178,41 +276,41 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
   const Scene& scene = *world.scene;
   std::vector<PlacedSamples> placed;
   std::vector<int> bounces;
+  std::vector<double> areas;
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
     const StageTimer timer(report, "place_samples");
     const GroupSurface surface = make_group_surface(group_meshes(scene, m));
     placed.push_back(
         place_samples(world, m, surface, plan.groups[m].points, hash_words(params.seed, m, 0), progress));
     bounces.push_back(plan.groups[m].bounces);
+    areas.push_back(placed[m].surface_area);
   }
-  const auto light_samples = [&](const TranslucentAnswer& answer) {
-    const StageTimer timer(report, "irradiance");
-    for (std::size_t m = 0; m < placed.size(); ++m)
-      placed[m].samples.irradiance = compute_irradiance(
-          world,
-          {placed[m].samples.positions, placed[m].samples.normals, placed[m].extents, placed[m].albedos},
-          scene.media[m].eta(), plan.groups[m].irradiance_samples, plan.groups[m].bounces,
-          hash_words(params.seed, m, 1), progress, answer);
-  };
-
+  const Illumination illumination(plan, params, placed, progress, report);
+  for (const std::string& name : light_planes(scene, params.per_light)) {
+    std::vector<SampleLight> lights = illumination.compute(with_lights_of(world, name));
+    for (std::size_t m = 0; m < placed.size(); ++m) {
+      lights[m].name = name;
+      placed[m].samples.lights.push_back(std::move(lights[m]));
+    }
+  }
+  std::vector<SurfaceSamples> samples;
+  for (PlacedSamples& group : placed) {
+    add_up_lights(group.samples);
+    samples.push_back(std::move(group.samples));
+  }
+  placed.clear();
   Cache cache;
   std::vector<std::shared_ptr<const void>> storage;
-  light_samples({});
-  cache.groups = build_groups(plan, placed, storage, report);
-  for (int round = 0; params.interreflect && round < kInterreflections; ++round) {
-    const TranslucentRadiance radiance = [&] {
-      const StageTimer timer(report, "diffusion");
-      return TranslucentRadiance(world, cache.groups, progress);
-    }();
-    light_samples(std::cref(radiance));
-    cache.groups = build_groups(plan, placed, storage, report);
-  }
-  for (const CacheGroup& group : cache.groups) {
+  cache.groups = build_groups(plan, areas, std::move(samples), storage, report);
+  for (std::size_t m = 0; m < cache.groups.size(); ++m) {
+    CacheGroup& group = cache.groups[m];
+    group.eta = double{scene.media[m].eta()};
     report.counts["points"] += group.size();
     report.counts["octree_nodes"] += group.nodes.size();
   }
   const StageTimer timer(report, "fingerprint");
-  cache.fingerprint = make_fingerprint(scene, bounces, world.shadows, params.interreflect);
+  cache.fingerprint =
+      make_fingerprint(scene, {bounces, world.shadows, params.interreflect, keeps_every_eta(scene, params)});
   cache.info = make_info(scene, plan, params, cache.groups);
   cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
   return cache;

@@ -62,7 +62,7 @@ std::string differences(const KeyValues& kept, const KeyValues& own) {
 }  // namespace
 
 std::vector<KeptExitance> load_exitance(const std::string& path) {
-  const layout::SectionReader reader(path, kExitanceFile);
+  const layout::SectionReader reader(path, {&kExitanceFile, 1});
   std::vector<KeptExitance> result;
   for (std::uint32_t g = 0; g < reader.group_count(); ++g) {
     KeptExitance& kept = result.emplace_back();

@@ -11,7 +11,7 @@
 namespace nacre {
 namespace {
 
-constexpr const char* kInterreflectionKey = "interreflection";
+constexpr const char *kShadowsKey = "shadows", *kInterreflectionKey = "interreflection";
 
 using HashState = std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)>;
 
@@ -87,18 +87,18 @@ std::string text(const ConductorSurface& surface) {
 
 class Fingerprinter {
  public:
-  Fingerprinter(const Scene& scene, std::span<const int> bounces, bool shadows, bool interreflect)
-      : scene_(scene), bounces_(bounces), shadows_(shadows), interreflect_(interreflect) {}
+  Fingerprinter(const Scene& scene, const BakeConditions& conditions)
+      : scene_(scene), bounces_(conditions.bounces), conditions_(conditions) {}
 
   KeyValues make() {
-    add("shadows", shadows_ ? "yes" : "no");
-    if (interreflect_) add(kInterreflectionKey, "yes");
+    add(kShadowsKey, conditions_.shadows ? "yes" : "no");
+    if (conditions_.interreflect) add(kInterreflectionKey, "yes");
     for (std::size_t m = 0; m < scene_.media.size(); ++m) {
       const std::string name = "medium " + medium_name(scene_, m);
-      add(name + "/eta", fmt::format("{}", scene_.media[m].eta()));
+      if (!conditions_.every_eta) add(name + "/eta", fmt::format("{}", scene_.media[m].eta()));
       add(name + "/bounces", fmt::format("{}", bounces_[m]));
       add_entry_albedo(name, m);
-      if (interreflect_) add_coefficients(name, scene_.media[m]);
+      if (conditions_.interreflect) add_coefficients(name, scene_.media[m]);
     }
     for (const Shape& shape : scene_.shapes) {
       if (casts_no_light(shape)) continue;
@@ -108,7 +108,7 @@ class Fingerprinter {
       add(name + "/geometry", hash_geometry(shape.mesh, reflects, has_texture(shape, reflects)));
       add(name + "/medium",
           shape.medium == kNone ? "none" : medium_name(scene_, static_cast<std::size_t>(shape.medium)));
-      if (reflects || (shadows_ && lets_light_through(shape))) add_surface(name, shape);
+      if (reflects || (conditions_.shadows && lets_light_through(shape))) add_surface(name, shape);
     }
     // How lights are chosen for sampling decides about noise alone.
     for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
@@ -132,7 +132,7 @@ class Fingerprinter {
   }
   // Without shadows and bounces an opaque shape that does not shine leaves no trace in the cache.
   bool casts_no_light(const Shape& shape) const {
-    return shape.medium == kNone && shape.light == kNone && !shadows_ && !bounce_matters();
+    return shape.medium == kNone && shape.light == kNone && !conditions_.shadows && !bounce_matters();
   }
   // What light passes straight on its way to samples, and is attenuated by.
   bool lets_light_through(const Shape& shape) const {
@@ -203,7 +203,7 @@ class Fingerprinter {
 
   const Scene& scene_;
   std::span<const int> bounces_;
-  bool shadows_, interreflect_;
+  const BakeConditions& conditions_;
   std::string name_;
   KeyValues result_;
 };
@@ -222,25 +222,25 @@ bool is_kind(const std::string& key, const std::string& kind) {
 
 }  // namespace
 
-KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows,
-                           bool interreflect) {
-  return Fingerprinter(scene, bounces, shadows, interreflect).make();
+KeyValues make_fingerprint(const Scene& scene, const BakeConditions& conditions) {
+  return Fingerprinter(scene, conditions).make();
 }
 
-bool fingerprint_interreflects(const KeyValues& fingerprint) {
-  return find_value(fingerprint, kInterreflectionKey) != nullptr;
-}
-
-std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups) {
-  std::vector<int> bounces;
-  for (const auto& [key, value] : fingerprint)
+BakeConditions fingerprint_conditions(const KeyValues& fingerprint, std::size_t groups) {
+  BakeConditions conditions;
+  conditions.every_eta = true;
+  for (const auto& [key, value] : fingerprint) {
+    if (key == kShadowsKey) conditions.shadows = value == "yes";
+    if (key == kInterreflectionKey) conditions.interreflect = true;
+    if (key.starts_with("medium ") && is_kind(key, "/eta")) conditions.every_eta = false;
     if (is_kind(key, "/bounces")) {
       int count = 0;
       std::from_chars(value.data(), value.data() + value.size(), count);
-      bounces.push_back(std::max(0, count));
+      conditions.bounces.push_back(std::max(0, count));
     }
-  bounces.resize(groups, 0);
-  return bounces;
+  }
+  conditions.bounces.resize(groups, 0);
+  return conditions;
 }
 
 std::string samples_digest(const CacheGroup& group) {

@@ -89,30 +89,84 @@ void check_nodes(const layout::SectionReader& reader, const CacheGroup& group, s
   if (!all(nodes, finite)) bad("a value is negative or not finite");
 }
 
+// Of a text that is nothing but a number of 0 or more; else -1.
+double parse_amount(const std::string& text) {
+  const char* end = text.data() + text.size();
+  double value = -1;
+  const auto parsed = std::from_chars(text.data(), end, value);
+  return parsed.ec == std::errc() && parsed.ptr == end && std::isfinite(value) && value >= 0 ? value : -1;
+}
+
+// Name, area and, since version 2, eta and the names of lights.
+void read_texts(const layout::SectionReader& reader, std::uint32_t index, CacheGroup& group) {
+  const KeyValues entries = reader.texts(layout::kGroup, index);
+  const bool first = reader.version() == 1;
+  const auto has = [&](std::size_t i, const char* key) {
+    return i < entries.size() && entries[i].first == key;
+  };
+  bool sound = has(0, "name") && has(1, "area") && (first ? entries.size() == 2 : has(2, "eta"));
+  for (std::size_t i = 3; i < entries.size(); ++i) sound = sound && has(i, "light");
+  if (!sound)
+    reader.damaged(
+        layout::kGroup, index,
+        first ? "it does not hold a name and an area" : "it does not hold a name, area, eta and lights");
+  group.name = entries[0].second;
+  group.surface_area = parse_amount(entries[1].second);
+  if (group.surface_area < 0)
+    reader.damaged(layout::kGroup, index, "the surface area is not a number of 0 or more");
+  if (first) return;
+  group.eta = parse_amount(entries[2].second);
+  if (group.eta < 0) reader.damaged(layout::kGroup, index, "eta is not a number of 0 or more");
+  for (std::size_t i = 3; i < entries.size(); ++i) group.lights.emplace_back().name = entries[i].second;
+}
+
+// A section with `per_sample` elements for each light and sample, or with nothing.
+template <class T>
+std::span<const T> read_plane(const layout::SectionReader& reader, layout::Kind kind, std::uint32_t index,
+                              const CacheGroup& group, std::size_t per_sample) {
+  const auto values = reader.array<T>(kind, index);
+  if (!values.empty() && values.size() != per_sample * group.lights.size() * group.size())
+    reader.damaged(kind, index, "its size is not that of the samples times the lights");
+  return values;
+}
+
+void read_lights(const layout::SectionReader& reader, std::uint32_t index, CacheGroup& group) {
+  const std::size_t n = group.size(), count = group.lights.size();
+  const auto irradiance = read_plane<float>(reader, layout::kLights, index, group, 3);
+  if (irradiance.empty() != (n == 0 || count < 2))
+    reader.damaged(layout::kLights, index, "it does not hold the irradiance of each of several lights");
+  const auto errors = read_plane<float>(reader, layout::kErrors, index, group, 1);
+  const auto ratios = read_plane<EtaRatios>(reader, layout::kRatios, index, group, 1);
+  const auto sound = [](float v) { return std::isfinite(v) && v >= 0; };
+  if (!all(irradiance, sound)) reader.damaged(layout::kLights, index, "a value is negative or not finite");
+  if (!all(errors, sound)) reader.damaged(layout::kErrors, index, "a value is negative or not finite");
+  for (std::size_t l = 0; l < count; ++l) {
+    LightPlane& light = group.lights[l];
+    for (std::size_t k = 0; k < 3; ++k)
+      light.irradiance[k] = count == 1 ? group.planes[7 + k]
+                            : n > 0    ? irradiance.subspan((3 * l + k) * n, n)
+                                       : std::span<const float>();
+    if (!errors.empty()) light.errors = errors.subspan(l * n, n);
+    if (!ratios.empty()) light.ratios = ratios.subspan(l * n, n);
+  }
+}
+
 CacheGroup read_group(const layout::SectionReader& reader, std::uint32_t index) {
   CacheGroup group;
-  KeyValues entries = reader.texts(layout::kGroup, index);
-  if (entries.size() != 2 || entries[0].first != "name" || entries[1].first != "area")
-    reader.damaged(layout::kGroup, index, "it does not hold a name and an area");
-  group.name = std::move(entries[0].second);
-  const std::string& area = entries[1].second;
-  const char* end = area.data() + area.size();
-  const auto parsed = std::from_chars(area.data(), end, group.surface_area);
-  if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(group.surface_area) ||
-      group.surface_area < 0)
-    reader.damaged(layout::kGroup, index, "the surface area is not a number of 0 or more");
+  read_texts(reader, index, group);
   for (std::size_t k = 0; k < kPlaneCount; ++k)
     group.planes[k] = reader.array<float>(layout::kPlanes[k], index);
   group.nodes = reader.array<OctreeNode>(layout::kNodes, index);
   check_planes(reader, group, index);
   check_nodes(reader, group, index);
+  if (reader.version() > 1) read_lights(reader, index, group);
   return group;
 }
 
 }  // namespace
 
 Cache load_cache(const std::string& path) {
-  const layout::SectionReader reader(path, layout::kCacheFile);
+  const layout::SectionReader reader(path, layout::kCacheFiles);
   Cache cache;
   cache.fingerprint = reader.texts(layout::kFingerprint, 0);
   cache.info = reader.texts(layout::kInfo, 0);

@@ -117,46 +117,105 @@ void compute_moments(const CacheGroup& group, OctreeNode& node) {
   }
 }
 
+// `values` in the order of `keyed`, and then they are gone.
+template <class T, class U, class Store>
+void sort_into(const std::vector<Keyed>& keyed, std::vector<T>& values, std::span<U> sorted,
+               const Store& store) {
+  parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) store(sorted, i, values[keyed[i].index]);
+  });
+  std::vector<T>().swap(values);
+}
+
+// Everything that a group's spans point to.
+struct OwnedGroup {
+  std::array<std::vector<float>, kPlaneCount> planes;
+  std::vector<float> light_irradiance, errors;  // of all lights, one after the other
+  std::vector<EtaRatios> ratios;
+  std::vector<OctreeNode> nodes;
+};
+
+template <class Triple>
+void sort_triples(const std::vector<Keyed>& keyed, std::vector<Triple>& values, std::span<float> x,
+                  std::span<float> y, std::span<float> z) {
+  sort_into(keyed, values, x, [&](std::span<float>, std::size_t i, const Triple& v) {
+    x[i] = v.x;
+    y[i] = v.y;
+    z[i] = v.z;
+  });
+}
+
+void sort_lights(const std::vector<Keyed>& keyed, std::vector<SampleLight>& lights, OwnedGroup& owned,
+                 CacheGroup& group) {
+  const std::size_t n = keyed.size(), count = lights.size();
+  const auto all = [&](auto member) {
+    return std::ranges::all_of(lights, [&](const SampleLight& light) { return (light.*member).size() == n; });
+  };
+  const auto keep = [](auto& sorted, std::size_t i, const auto& value) { sorted[i] = value; };
+  const bool apart = count > 1, errors = all(&SampleLight::errors), ratios = all(&SampleLight::ratios);
+  if (apart) owned.light_irradiance.resize(3 * n * count);
+  if (errors) owned.errors.resize(n * count);
+  if (ratios) owned.ratios.resize(n * count);
+  for (std::size_t l = 0; l < count; ++l) {
+    LightPlane& plane = group.lights.emplace_back();
+    plane.name = lights[l].name;
+    for (std::size_t k = 0; k < 3; ++k)
+      plane.irradiance[k] = apart ? std::span<const float>(owned.light_irradiance).subspan((3 * l + k) * n, n)
+                                  : group.planes[7 + k];
+    if (apart) {
+      const auto channel = [&](std::size_t k) {
+        return std::span(owned.light_irradiance).subspan((3 * l + k) * n, n);
+      };
+      sort_triples(keyed, lights[l].irradiance, channel(0), channel(1), channel(2));
+    }
+    if (errors) {
+      const auto sorted = std::span(owned.errors).subspan(l * n, n);
+      sort_into(keyed, lights[l].errors, sorted, keep);
+      plane.errors = sorted;
+    }
+    if (ratios) {
+      const auto sorted = std::span(owned.ratios).subspan(l * n, n);
+      sort_into(keyed, lights[l].ratios, sorted, keep);
+      plane.ratios = sorted;
+    }
+  }
+}
+
 }  // namespace
 
 double hexagonal_spacing(double area, double count) {
   return count > 0 ? std::sqrt(2 / std::sqrt(3.0) * area / count) : 0;
 }
 
-CacheGroup build_group(std::string name, double surface_area, const SurfaceSamples& samples,
+void sum_nodes(const CacheGroup& group, std::span<OctreeNode> nodes) {
+  parallel_for(nodes.size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) compute_moments(group, nodes[n]);
+  });
+}
+
+CacheGroup build_group(std::string name, double surface_area, SurfaceSamples samples,
                        std::vector<std::shared_ptr<const void>>& storage) {
   if (samples.size() > kMaxSamplesPerGroup)
     fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(),
          kMaxSamplesPerGroup);
   const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
-
-  struct Owned {
-    std::array<std::vector<float>, kPlaneCount> planes;
-    std::vector<OctreeNode> nodes;
-  };
-  const auto owned = std::make_shared<Owned>();
-  for (auto& plane : owned->planes) plane.resize(samples.size());
-  parallel_for(samples.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t from = keyed[i].index;
-      for (int axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<std::size_t>(axis);
-        owned->planes[a][i] = samples.positions[from][axis];
-        owned->planes[3 + a][i] = samples.normals[from][axis];
-        owned->planes[7 + a][i] = samples.irradiance[from][axis];
-      }
-      owned->planes[6][i] = samples.areas[from];
-    }
-  });
-  owned->nodes = divide(keyed);
-
+  const auto owned = std::make_shared<OwnedGroup>();
   CacheGroup group;
   group.name = std::move(name);
   group.surface_area = surface_area;
-  for (std::size_t k = 0; k < kPlaneCount; ++k) group.planes[k] = owned->planes[k];
-  parallel_for(owned->nodes.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) compute_moments(group, owned->nodes[n]);
-  });
+  for (std::size_t k = 0; k < kPlaneCount; ++k) {
+    owned->planes[k].resize(samples.size());
+    group.planes[k] = owned->planes[k];
+  }
+  auto& planes = owned->planes;
+  sort_triples(keyed, samples.positions, planes[0], planes[1], planes[2]);
+  sort_triples(keyed, samples.normals, planes[3], planes[4], planes[5]);
+  sort_into(keyed, samples.areas, std::span(planes[6]),
+            [](std::span<float> sorted, std::size_t i, float area) { sorted[i] = area; });
+  sort_triples(keyed, samples.irradiance, planes[7], planes[8], planes[9]);
+  sort_lights(keyed, samples.lights, *owned, group);
+  owned->nodes = divide(keyed);
+  sum_nodes(group, owned->nodes);
   group.nodes = owned->nodes;
   storage.push_back(owned);
   return group;

@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -75,9 +76,9 @@ void append_u32(std::string& out, std::size_t value) {
 
 }  // namespace
 
-SectionReader::SectionReader(std::string path, const FileKind& file_kind)
-    : path_(std::move(path)), file_kind_(file_kind) {
-  const auto file = std::make_shared<MappedFile>(path_, file_kind.name);
+SectionReader::SectionReader(std::string path, std::span<const FileKind> versions)
+    : path_(std::move(path)), versions_(versions), file_kind_(&versions.back()) {
+  const auto file = std::make_shared<MappedFile>(path_, file_kind_->name);
   storage_ = file;
   file_ = {file->data(), file->size()};
   check_header();
@@ -91,20 +92,20 @@ std::span<const unsigned char> SectionReader::section(Kind kind, std::uint32_t g
 
 void SectionReader::damaged(Kind kind, std::uint32_t group, const std::string& reason) const {
   fail(ErrorCode::kDamaged, fmt::format("{}: byte {}", path_, find(kind, group).offset),
-       "section {} of group {} is damaged: {}; {}", text_of(kind), group, reason, file_kind_.remedy);
+       "section {} of group {} is damaged: {}; {}", text_of(kind), group, reason, file_kind_->remedy);
 }
 
 // The table is known to be in the one order that the format allows.
 const SectionEntry& SectionReader::find(Kind kind, std::uint32_t group) const {
-  for (std::size_t i = 0; i < file_kind_.of_file.size(); ++i)
-    if (file_kind_.of_file[i] == kind) return table_[i];
-  std::uint64_t i = file_kind_.section_count(group);
+  for (std::size_t i = 0; i < file_kind_->of_file.size(); ++i)
+    if (file_kind_->of_file[i] == kind) return table_[i];
+  std::uint64_t i = file_kind_->section_count(group);
   while (table_[i].kind != kind) ++i;
   return table_[i];
 }
 
 void SectionReader::check_header() {
-  const FileKind& k = file_kind_;
+  const FileKind& k = *file_kind_;
   if (file_.size() < k.magic.size() || std::memcmp(file_.data(), k.magic.data(), k.magic.size()) != 0)
     fail(ErrorCode::kNotACache, path_, "is not a nacre {}; {}", k.name,
          fmt::format(fmt::runtime(k.origin), path_));
@@ -118,8 +119,10 @@ void SectionReader::check_header() {
     fail(ErrorCode::kNewerVersion, path_,
          "has format version {}, newer than {}, the newest this nacre reads; update nacre", header_.version,
          k.version);
-  if (header_.endian_mark != kEndianMark || header_.version != k.version)
+  const auto own = std::ranges::find(versions_, header_.version, &FileKind::version);
+  if (header_.endian_mark != kEndianMark || own == versions_.end())
     fail(ErrorCode::kDamaged, path_ + ": byte 8", "unknown version or byte order; {}", k.remedy);
+  file_kind_ = &*own;
   if (file_.size() < header_.file_size) truncated(header_.file_size);
   if (file_.size() > header_.file_size)
     fail(ErrorCode::kDamaged, fmt::format("{}: byte {}", path_, header_.file_size),
@@ -127,7 +130,7 @@ void SectionReader::check_header() {
 }
 
 void SectionReader::check_table() {
-  const FileKind& k = file_kind_;
+  const FileKind& k = *file_kind_;
   const std::uint64_t count = k.section_count(header_.group_count);
   const std::uint64_t bytes = count * sizeof(SectionEntry);
   if (header_.section_count != count)
@@ -165,8 +168,8 @@ void SectionReader::check_table() {
 
 void SectionReader::truncated(std::uint64_t wanted) const {
   fail(ErrorCode::kTruncated, fmt::format("{}: byte {}", path_, file_.size()),
-       "the {} ends here but should have {} bytes; copy it again or {}", file_kind_.name, wanted,
-       file_kind_.remedy);
+       "the {} ends here but should have {} bytes; copy it again or {}", file_kind_->name, wanted,
+       file_kind_->remedy);
 }
 
 KeyValues SectionReader::texts(Kind kind, std::uint32_t group) const {

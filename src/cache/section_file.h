@@ -59,8 +59,10 @@ constexpr std::uint64_t align(std::uint64_t offset) {
 /// the place: kNotFound, kIo, kNotACache, kNewerVersion, kTruncated, kDamaged (naming the section).
 class SectionReader {
  public:
-  SectionReader(std::string path, const FileKind& file_kind);
+  /// `versions` of one file, the newest last.
+  SectionReader(std::string path, std::span<const FileKind> versions);
 
+  std::uint32_t version() const { return header_.version; }
   std::uint32_t group_count() const { return header_.group_count; }
   /// Keeps the mapping alive.
   std::shared_ptr<const void> storage() const { return storage_; }
@@ -81,7 +83,8 @@ class SectionReader {
   [[noreturn]] void truncated(std::uint64_t wanted) const;
 
   std::string path_;
-  const FileKind& file_kind_;
+  std::span<const FileKind> versions_;
+  const FileKind* file_kind_;  // the newest, until the file says which
   std::shared_ptr<const void> storage_;
   std::span<const unsigned char> file_;
   Header header_{};

@@ -71,30 +71,27 @@ struct RayTracer::Impl {
   Box3 box;
 };
 
-RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::uint32_t> masks)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->device.reset(rtcNewDevice(nullptr));
-  const RTCDevice device = impl_->device.get();
+RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::uint32_t> masks) {
+  const auto impl = std::make_shared<Impl>();
+  impl_ = impl;
+  impl->device.reset(rtcNewDevice(nullptr));
+  const RTCDevice device = impl->device.get();
   if (device == nullptr)
     fail(ErrorCode::kIo, "", "Embree does not start (error {})",
          static_cast<int>(rtcGetDeviceError(nullptr)));
-  impl_->scene.reset(rtcNewScene(device));
-  const RTCScene scene = impl_->scene.get();
+  impl->scene.reset(rtcNewScene(device));
+  const RTCScene scene = impl->scene.get();
   check(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   for (std::uint32_t i = 0; i < meshes.size(); ++i) {
     if (meshes[i]->triangles.empty()) continue;
     attach(device, scene, *meshes[i], i, masks.empty() ? ~0u : masks[i]);
-    impl_->box.extendBy(nacre::bounds(*meshes[i]));
+    impl->box.extendBy(nacre::bounds(*meshes[i]));
   }
   rtcCommitScene(scene);
   check(device);
 }
-
-RayTracer::~RayTracer() = default;
-RayTracer::RayTracer(RayTracer&&) noexcept = default;
-RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
 Hit RayTracer::intersect(const Ray& ray, std::uint32_t mask) const noexcept {
   if (!has_interval(ray)) return {};

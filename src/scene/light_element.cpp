@@ -125,6 +125,7 @@ Light read_light(const XmlElement& element, Warnings& warnings) {
   light.id = element.get("id");
   light.place = element.place();
   light.sampling_weight = parameters.number("samplingWeight", 1, kWeight);
+  light.group = parameters.string("group", "");
   const std::string type = plugin_type(element);
   if (type == "point")
     light.model = read_point(parameters);
@@ -152,6 +153,7 @@ Light read_area_light(const XmlElement& element, std::uint32_t shape, Warnings& 
   light.place = element.place();
   light.model = AreaLight{shape, parameters.color("radiance", {1, 1, 1}, kEmission)};
   light.sampling_weight = parameters.number("samplingWeight", 1, kWeight);
+  light.group = parameters.string("group", "");
   parameters.finish();
   return light;
 }

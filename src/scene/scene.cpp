@@ -35,6 +35,26 @@ std::string light_name(const Scene& scene, std::size_t light) {
   return id.empty() ? fmt::format("light {}", light + 1) : id;
 }
 
+std::string light_plane_name(const Scene& scene, std::size_t light) {
+  const std::string& group = scene.lights[light].group;
+  return group.empty() ? light_name(scene, light) : group;
+}
+
+void scale_light(Light& light, const Rgb& scale) {
+  struct Scaler {
+    const Rgb& scale;
+    void operator()(PointLight& l) const { l.intensity *= scale; }
+    void operator()(SpotLight& l) const { l.intensity *= scale; }
+    void operator()(DirectionalLight& l) const { l.irradiance *= scale; }
+    void operator()(AreaLight& l) const { l.radiance *= scale; }
+    void operator()(ConstantLight& l) const { l.radiance *= scale; }
+    void operator()(EnvironmentMap& l) const {
+      for (Rgb& texel : l.radiance.texels) texel *= scale;
+    }
+  };
+  std::visit(Scaler{scale}, light.model);
+}
+
 std::string medium_name(const Scene& scene, std::size_t medium) {
   const std::string& id = scene.media[medium].id;
   return id.empty() ? fmt::format("medium {}", medium + 1) : id;

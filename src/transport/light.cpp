@@ -89,6 +89,7 @@ LightSample sample_model(const Query& query, const AreaLight& light) {
 
 LightSample sample_light(const World& world, std::size_t light, const Vec3& x, const Vec2& u,
                          const Vec3& normal) noexcept {
+  if (!world.sends(light)) return {};
   const Query query{world, light, x, normal, u};
   return std::visit([&](const auto& model) { return sample_model(query, model); },
                     world.scene->lights[light].model);
@@ -107,7 +108,7 @@ float pdf_light(const World& world, std::size_t light, const Vec3&, const Vec3& 
 }
 
 Rgb environment_radiance(const World& world, const Vec3& direction) noexcept {
-  if (world.lights.environment == kNoLight) return {0, 0, 0};
+  if (world.lights.environment == kNoLight || !world.sends(world.lights.environment)) return {0, 0, 0};
   if (world.lights.map) return world.lights.map->radiance(direction);
   return std::get<ConstantLight>(world.scene->lights[world.lights.environment].model).radiance;
 }

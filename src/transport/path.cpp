@@ -71,6 +71,7 @@ Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noe
   if (shape.light == kNone || dot(face_normal(shape.mesh, hit.triangle), ray.ray.direction) >= 0)
     return {0, 0, 0};
   const auto light = static_cast<std::size_t>(shape.light);
+  if (!world.sends(light)) return {0, 0, 0};
   const Rgb radiance = std::get<AreaLight>(world.scene->lights[light].model).radiance;
   if (ray.density == 0) return radiance;
   return radiance * ray_share(world, ray, light, pdf_light(world, light, ray.position, hit));

@@ -336,9 +336,9 @@ TEST(Bake, FingerprintIsThatOfTheScene) {
   params.points = 100;
   params.bounces = 2;
   const Cache cache = run(scene, params);
-  EXPECT_EQ(describe_mismatch(cache.fingerprint, make_fingerprint(scene, std::vector<int>{2, 2}, true)), "");
-  EXPECT_NE(describe_mismatch(cache.fingerprint, make_fingerprint(scene, std::vector<int>{2, 1}, true)), "");
-  EXPECT_NE(describe_mismatch(cache.fingerprint, make_fingerprint(scene, std::vector<int>{2, 2}, false)), "");
+  EXPECT_EQ(describe_mismatch(cache.fingerprint, make_fingerprint(scene, {{2, 2}, true, false, true})), "");
+  EXPECT_NE(describe_mismatch(cache.fingerprint, make_fingerprint(scene, {{2, 1}, true, false, true})), "");
+  EXPECT_NE(describe_mismatch(cache.fingerprint, make_fingerprint(scene, {{2, 2}, false, false, true})), "");
 }
 
 }  // namespace

@@ -26,10 +26,10 @@ Rgb irradiance_at(const Scene& scene, const Vec3& position, const Vec3& normal, 
   const std::vector<Vec3> positions(repeats, position), normals(repeats, normal);
   const std::vector<float> extents(repeats, 1.0f);
   Progress progress;
-  const auto values =
-      compute_irradiance(world, {positions, normals, extents}, kEta, samples, bounces, 11, progress);
+  const auto values = compute_irradiance(world, {positions, normals, extents}, kEta,
+                                         {samples, bounces, 0, false, 11}, progress);
   Rgb sum(0, 0, 0);
-  for (const Rgb& value : values) sum += value / static_cast<float>(repeats);
+  for (const Rgb& value : values.irradiance) sum += value / static_cast<float>(repeats);
   return sum;
 }
 
@@ -138,7 +138,7 @@ TEST(Irradiance, UnderAnEmittingSphere) {
     const double cosine = edge + (1 - edge) * (i + 0.5) / kSteps;
     expected += 2 * kPiD * (1 - edge) / kSteps * cosine * transmittance(cosine);
   }
-  expect_rgb(irradiance_at(scene, Vec3(0), kUp, 1 << 13, 0, true, 4), kSpectrum, expected, 5e-3);
+  expect_rgb(irradiance_at(scene, Vec3(0), kUp, 1 << 13, 0, true, 64), kSpectrum, expected, 2e-3);
 }
 
 TEST(Irradiance, Shadows) {
@@ -238,7 +238,9 @@ TEST(Irradiance, SurfacesDoNotShadowThemselves) {
   }
   const World world = make_world(scene, true);
   Progress progress;
-  for (const Rgb& e : compute_irradiance(world, {positions, normals, extents}, kEta, 1, 0, 1, progress))
+  for (const Rgb& e :
+       compute_irradiance(world, {positions, normals, extents}, kEta, {1, 0, 0, false, 1}, progress)
+           .irradiance)
     EXPECT_GT(e.x, 0);
 }
 
@@ -306,7 +308,8 @@ TEST(Irradiance, DependsOnSeedButNotOnThreads) {
   const std::vector<float> extents(positions.size(), 0.1f);
   const auto run = [&](std::uint64_t seed) {
     Progress progress;
-    return compute_irradiance(world, {positions, normals, extents}, kEta, 8, 2, seed, progress);
+    return compute_irradiance(world, {positions, normals, extents}, kEta, {8, 2, 0, false, seed}, progress)
+        .irradiance;
   };
   std::vector<Rgb> one, two;
   {

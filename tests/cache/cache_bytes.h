@@ -51,6 +51,45 @@ inline Cache make_golden_cache() {
   return cache;
 }
 
+/// The cache of tests/golden/cache/good-v2.nacre: the same with two lights, their errors, and ratios that are
+/// their own places.
+inline Cache make_golden_cache_2() {
+  SurfaceSamples wax;
+  for (int i = 0; i < 2; ++i) {
+    SampleLight& light = wax.lights.emplace_back();
+    light.name = i == 0 ? "key" : "rim";
+    for (int s = 0; s < 3; ++s) {
+      const auto x = static_cast<float>(s);
+      light.irradiance.push_back({x, 1, static_cast<float>(i)});
+      light.errors.push_back(0.25f * x);
+      EtaRatios& ratios = light.ratios.emplace_back();
+      for (std::size_t j = 0; j < ratios.size(); ++j)
+        ratios[j] = static_cast<std::uint16_t>(100 * i + 1000 * s + static_cast<int>(j));
+    }
+  }
+  for (int s = 0; s < 3; ++s) {
+    wax.positions.push_back({static_cast<float>(s), 0, 0});
+    wax.normals.push_back({0, 0, 1});
+    wax.areas.push_back(0.5f);
+    wax.irradiance.push_back(wax.lights[0].irradiance[static_cast<std::size_t>(s)] +
+                             wax.lights[1].irradiance[static_cast<std::size_t>(s)]);
+  }
+  SurfaceSamples milk;
+  milk.positions = {{-1, -2, -3}};
+  milk.normals = {{0, -1, 0}};
+  milk.areas = {2};
+  milk.irradiance = {{0.5f, 0.25f, 4}};
+  milk.lights.emplace_back();
+  Cache cache;
+  std::vector<std::shared_ptr<const void>> storage;
+  cache.groups = {build_group("wax", 1.5, wax, storage), build_group("milk", 2, milk, storage)};
+  cache.groups[0].eta = 1.5;
+  cache.groups[1].eta = 1.25;
+  cache.fingerprint = {{"shadows", "no"}};
+  cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
+  return cache;
+}
+
 inline layout::SectionEntry entry_at(const Bytes& bytes, std::size_t i) {
   layout::SectionEntry entry;
   std::memcpy(&entry, bytes.data() + sizeof(layout::Header) + i * sizeof entry, sizeof entry);

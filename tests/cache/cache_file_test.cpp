@@ -30,6 +30,16 @@ void expect_equal(const Cache& a, const Cache& b) {
                   0);
       }
     }
+    EXPECT_EQ(a.groups[g].eta, b.groups[g].eta);
+    ASSERT_EQ(a.groups[g].lights.size(), b.groups[g].lights.size());
+    for (std::size_t l = 0; l < a.groups[g].lights.size(); ++l) {
+      const LightPlane &one = a.groups[g].lights[l], &other = b.groups[g].lights[l];
+      EXPECT_EQ(one.name, other.name);
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_TRUE(std::ranges::equal(one.irradiance[k], other.irradiance[k]));
+      EXPECT_TRUE(std::ranges::equal(one.errors, other.errors));
+      EXPECT_TRUE(std::ranges::equal(one.ratios, other.ratios));
+    }
     ASSERT_EQ(a.groups[g].nodes.size(), b.groups[g].nodes.size());
     if (!a.groups[g].nodes.empty()) {
       EXPECT_EQ(
@@ -104,6 +114,15 @@ TEST_F(CacheFile, GoldenFileHoldsWhatItHeld) {
   EXPECT_EQ(good(), read_bytes(kGolden + "good-v1.nacre"));
 }
 
+TEST_F(CacheFile, GoldenFileOfVersion2HoldsWhatItHeld) {
+  const Cache cache = load_cache(kGolden + "good-v2.nacre");
+  expect_equal(cache, make_golden_cache_2());
+  save_cache(make_golden_cache_2(), path_);
+  EXPECT_EQ(read_bytes(path_), read_bytes(kGolden + "good-v2.nacre"));
+  save_cache(cache, path_);
+  EXPECT_EQ(read_bytes(path_), read_bytes(kGolden + "good-v2.nacre"));
+}
+
 struct BadFile {
   const char* name;
   ErrorCode code;
@@ -113,7 +132,7 @@ struct BadFile {
 TEST_F(CacheFile, GoldenBadFilesAreRefused) {
   const BadFile files[] = {
       {"bad-text-transfer.nacre", ErrorCode::kNotACache, "is not a nacre cache"},
-      {"bad-newer-version.nacre", ErrorCode::kNewerVersion, "format version 2"},
+      {"bad-newer-version.nacre", ErrorCode::kNewerVersion, "format version 99"},
       {"bad-truncated.nacre", ErrorCode::kTruncated, "the cache ends here"},
       {"bad-header.nacre", ErrorCode::kDamaged, "the header is damaged"},
       {"bad-irradiance.nacre", ErrorCode::kDamaged, "section IRRG of group 0 is damaged: its checksum"},
@@ -179,7 +198,7 @@ TEST_F(CacheFile, WhatFollowsTheEndIsRefused) {
 
 TEST_F(CacheFile, NewerVersionsAreToldFromDamage) {
   Bytes bytes = good();
-  put(bytes, offsetof(layout::Header, version), std::uint32_t{2});
+  put(bytes, offsetof(layout::Header, version), kCacheVersion + 1);
   EXPECT_EQ(error_of(bytes).code(), ErrorCode::kDamaged);
   seal(bytes);
   EXPECT_EQ(error_of(bytes).code(), ErrorCode::kNewerVersion);

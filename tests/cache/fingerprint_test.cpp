@@ -49,7 +49,7 @@ Scene make_scene() {
 }
 
 KeyValues fingerprint(const Scene& scene, int bounces = 1, bool shadows = true) {
-  return make_fingerprint(scene, std::array{bounces}, shadows);
+  return make_fingerprint(scene, {{bounces}, shadows});
 }
 
 // The mismatch after a change to the scene, baked with so many bounces.
@@ -306,15 +306,38 @@ TEST(FingerprintBounces, AreThoseItWasMadeWith) {
   scene.media.push_back(scene.media[0]);  // of the same name
   scene.media.push_back(scene.media[0]);
   scene.media[2].id = "milk";
-  EXPECT_EQ(fingerprint_bounces(make_fingerprint(scene, std::array{3, 0, 7}, true), 3),
+  EXPECT_EQ(fingerprint_conditions(make_fingerprint(scene, {{3, 0, 7}, true}), 3).bounces,
             (std::vector<int>{3, 0, 7}));
 }
 
+TEST(FingerprintConditions, AreThoseItWasMadeWith) {
+  const Scene scene = make_scene();
+  for (const bool shadows : {false, true})
+    for (const bool interreflect : {false, true})
+      for (const bool every_eta : {false, true}) {
+        const BakeConditions c =
+            fingerprint_conditions(make_fingerprint(scene, {{2}, shadows, interreflect, every_eta}), 1);
+        EXPECT_EQ(c.shadows, shadows);
+        EXPECT_EQ(c.interreflect, interreflect);
+        EXPECT_EQ(c.every_eta, every_eta);
+      }
+}
+
+// Of a cache that serves all of them, the index is none of its business.
+TEST(FingerprintConditions, EveryEtaLeavesItOut) {
+  const Scene scene = make_scene();
+  Scene other = scene;
+  other.media[0].int_ior = 1.31f;
+  EXPECT_NE(make_fingerprint(scene, {{1}, true}), make_fingerprint(other, {{1}, true}));
+  EXPECT_EQ(make_fingerprint(scene, {{1}, true, false, true}),
+            make_fingerprint(other, {{1}, true, false, true}));
+}
+
 TEST(FingerprintBounces, AreZeroWhereTheFingerprintHasNone) {
-  EXPECT_EQ(fingerprint_bounces({}, 2), (std::vector<int>{0, 0}));
-  EXPECT_EQ(fingerprint_bounces({{"medium a/bounces", "-4"}, {"medium b/bounces", "x"}}, 2),
+  EXPECT_EQ(fingerprint_conditions({}, 2).bounces, (std::vector<int>{0, 0}));
+  EXPECT_EQ(fingerprint_conditions({{"medium a/bounces", "-4"}, {"medium b/bounces", "x"}}, 2).bounces,
             (std::vector<int>{0, 0}));
-  EXPECT_EQ(fingerprint_bounces({{"medium a/bounces", "1"}, {"medium b/bounces", "2"}}, 1),
+  EXPECT_EQ(fingerprint_conditions({{"medium a/bounces", "1"}, {"medium b/bounces", "2"}}, 1).bounces,
             (std::vector<int>{1}));
 }
 

@@ -25,6 +25,11 @@ struct Group {
   double area = 0;
   std::vector<float> planes[10];
   std::vector<Node> nodes;
+  // Since version 2.
+  double eta = 0;
+  std::vector<std::string> lights;
+  std::vector<float> light_irradiance, errors;
+  std::vector<std::uint32_t> ratios;
 };
 
 struct File {
@@ -101,11 +106,13 @@ void read_file(const std::string& path, File& result) {
   const unsigned char magic[8] = {0x89, 0x4e, 0x41, 0x43, 0x52, 0x45, 0x0d, 0x0a};
   ASSERT_EQ(std::memcmp(bytes.data(), magic, 8), 0);
   ASSERT_EQ(read_integer(bytes, 56, 8), XXH3_64bits(bytes.data(), 56));
-  ASSERT_EQ(read_u32(bytes, 8), 1u);
+  const std::uint32_t version = read_u32(bytes, 8);
+  ASSERT_TRUE(version == 1 || version == 2);
+  const std::uint32_t per_group = version == 1 ? 12 : 15;
   ASSERT_EQ(read_u32(bytes, 12), 0x0a0b0c0du);
   ASSERT_EQ(read_integer(bytes, 16, 8), bytes.size());
   const std::uint32_t section_count = read_u32(bytes, 24), group_count = read_u32(bytes, 28);
-  ASSERT_EQ(section_count, 2 + 12 * group_count);
+  ASSERT_EQ(section_count, 2 + per_group * group_count);
   ASSERT_EQ(read_integer(bytes, 32, 8), XXH3_64bits(bytes.data() + 64, 32 * section_count));
 
   const char* planes[] = {"POSX", "POSY", "POSZ", "NRMX", "NRMY", "NRMZ", "AREA", "IRRR", "IRRG", "IRRB"};
@@ -114,6 +121,8 @@ void read_file(const std::string& path, File& result) {
     order.emplace_back("GRUP", g);
     for (const char* plane : planes) order.emplace_back(plane, g);
     order.emplace_back("NODE", g);
+    if (version == 1) continue;
+    for (const char* kind : {"LITE", "IRRE", "ETAR"}) order.emplace_back(kind, g);
   }
   std::vector<Section> sections;
   std::uint64_t end = 64 + 32 * section_count;
@@ -134,10 +143,26 @@ void read_file(const std::string& path, File& result) {
   result.fingerprint = read_texts(bytes, sections[0]);
   result.info = read_texts(bytes, sections[1]);
   for (std::size_t g = 0; g < group_count; ++g) {
-    const Section* of_group = &sections[2 + 12 * g];
+    const Section* of_group = &sections[2 + per_group * g];
     Group group;
     const Texts texts = read_texts(bytes, of_group[0]);
-    ASSERT_EQ(texts.size(), 2u);
+    if (version == 1) {
+      ASSERT_EQ(texts.size(), 2u);
+    } else {
+      ASSERT_GE(texts.size(), 3u);
+      ASSERT_EQ(texts[2].first, "eta");
+      group.eta = std::stod(texts[2].second);
+      for (std::size_t i = 3; i < texts.size(); ++i) {
+        ASSERT_EQ(texts[i].first, "light");
+        group.lights.push_back(texts[i].second);
+      }
+      for (std::uint64_t at = 0; at < of_group[12].size; at += 4)
+        group.light_irradiance.push_back(read_f32(bytes, of_group[12].offset + at));
+      for (std::uint64_t at = 0; at < of_group[13].size; at += 4)
+        group.errors.push_back(read_f32(bytes, of_group[13].offset + at));
+      for (std::uint64_t at = 0; at < of_group[14].size; at += 2)
+        group.ratios.push_back(static_cast<std::uint32_t>(read_integer(bytes, of_group[14].offset + at, 2)));
+    }
     ASSERT_EQ(texts[0].first, "name");
     ASSERT_EQ(texts[1].first, "area");
     group.name = texts[0].second;
@@ -172,6 +197,34 @@ TEST(Format, IsCompleteEnoughForASecondReader) {
   EXPECT_EQ(file.groups[2].name, "medium 3");
   EXPECT_TRUE(file.groups[2].planes[0].empty());
   EXPECT_TRUE(file.groups[2].nodes.empty());
+}
+
+TEST(Format, KeepsLightsApart) {
+  File file;
+  read_file(NACRE_SOURCE_DIR "/tests/golden/cache/good-v2.nacre", file);
+  if (HasFatalFailure()) return;
+  ASSERT_EQ(file.groups.size(), 2u);
+  const Group& wax = file.groups[0];
+  EXPECT_EQ(wax.eta, 1.5);
+  EXPECT_EQ(wax.lights, (std::vector<std::string>{"key", "rim"}));
+  ASSERT_EQ(wax.light_irradiance.size(), 2u * 3 * 3);
+  ASSERT_EQ(wax.errors.size(), 2u * 3);
+  ASSERT_EQ(wax.ratios.size(), 2u * 3 * 15);
+  for (std::size_t light = 0; light < 2; ++light)
+    for (std::size_t sample = 0; sample < 3; ++sample) {
+      const auto x = static_cast<float>(sample);
+      const float expected[3] = {x, 1, static_cast<float>(light)};
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_EQ(wax.light_irradiance[(3 * light + k) * 3 + sample], expected[k]);
+      EXPECT_EQ(wax.errors[3 * light + sample], 0.25f * x);
+      for (std::size_t j = 0; j < 15; ++j)
+        EXPECT_EQ(wax.ratios[(3 * light + sample) * 15 + j], 100 * light + 1000 * sample + j);
+    }
+  // One light needs no irradiance of its own, and of this one nothing else is known.
+  EXPECT_EQ(file.groups[1].lights, std::vector<std::string>{""});
+  EXPECT_TRUE(file.groups[1].light_irradiance.empty());
+  EXPECT_TRUE(file.groups[1].errors.empty());
+  EXPECT_TRUE(file.groups[1].ratios.empty());
 }
 
 // The octree as the page describes it, recomputed from the samples.

@@ -97,6 +97,53 @@ TEST_F(CacheFile, HostileNumbersAreRefused) {
       if (at >= 12 || value != -1.0f) refused("NODE", 64 + at, value);
 }
 
+TEST_F(CacheFile, HostileLightsAreRefused) {
+  save_cache(make_golden_cache_2(), path_);
+  const Bytes bytes = read_bytes(path_);
+  EXPECT_NO_THROW(load_cache(path_));
+  for (const char* kind : {"LITE", "IRRE"})
+    for (const float value :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1.0f}) {
+      Bytes changed = bytes;
+      put(changed, entry_at(bytes, find_section(bytes, kind, 0)).offset + 8, value);
+      seal(changed);
+      expect_damaged(changed, kind, 0, fmt::format("{}", value));
+    }
+  // Any ratio is one.
+  Bytes ratios = bytes;
+  put(ratios, entry_at(bytes, find_section(bytes, "ETAR", 0)).offset, std::uint64_t{0xfffffffffffffffful});
+  seal(ratios);
+  write_bytes(path_, ratios);
+  EXPECT_NO_THROW(load_cache(path_));
+  // Lights under another name, an index that is no number.
+  const auto texts = entry_at(bytes, find_section(bytes, "GRUP", 0));
+  const std::string text(reinterpret_cast<const char*>(bytes.data()) + texts.offset, texts.size);
+  for (const std::size_t at : {text.find("light"), text.find("eta"), text.find("1.5", text.find("eta"))}) {
+    Bytes changed = bytes;
+    put(changed, texts.offset + at, 'x');
+    seal(changed);
+    expect_damaged(changed, "GRUP", 0, fmt::format("at {}", at));
+  }
+}
+
+// Sections that do not have a value for each light and sample.
+TEST_F(CacheFile, LightsOfTheWrongSizeAreRefused) {
+  const Cache good = make_golden_cache_2();
+  const auto refused = [&](const Cache& cache, const char* kind) {
+    save_cache(cache, path_);
+    expect_damaged(read_bytes(path_), kind, 0, kind);
+  };
+  Cache errors = good;
+  errors.groups[0].lights[0].errors = errors.groups[0].lights[0].errors.first(2);
+  refused(errors, "IRRE");
+  Cache ratios = good;
+  ratios.groups[0].lights[0].ratios = ratios.groups[0].lights[0].ratios.first(1);
+  refused(ratios, "ETAR");
+  Cache irradiance = good;
+  irradiance.groups[0].lights[0].irradiance[0] = {};
+  refused(irradiance, "LITE");
+}
+
 // Each factor is a number; the product, a sample's power, is not, and would give NaN where R is 0.
 TEST_F(CacheFile, InfinitePowersAreRefused) {
   Bytes bytes = good();

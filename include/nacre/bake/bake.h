@@ -19,7 +19,10 @@ struct BakeParams {
       irradiance_samples;      // per point and light; none: the scene's, else kDefaultIrradianceSamples
   std::optional<int> bounces;  // of light between opaque surfaces; none: what the scene's integrator gives
   bool shadows = true;
-  bool interreflect = false;  // whether translucent objects light themselves and each other
+  bool interreflect = false;    // whether translucent objects light themselves and each other
+  double irradiance_error = 0;  // relative standard error that samples are refined to; 0: none are
+  bool per_light = false;       // whether lights are kept apart (light_plane_name)
+  bool fixed_eta = false;       // whether the cache is for the media's own indices of refraction alone
   std::uint64_t seed = 0;
 };
 
@@ -38,6 +41,11 @@ struct GroupPlan {
   int irradiance_samples = 0;
   int bounces = 0;
 };
+/// Whether a cache keeps what light does at other indices of refraction than the media's own: not where light
+/// goes between translucent objects, whose coefficients are part of it then, nor for indices outside of
+/// [kLeastEta, kMostEta].
+bool keeps_every_eta(const Scene& scene, const BakeParams& params);
+
 struct BakePlan {
   std::vector<GroupPlan> groups;  // parallel to Scene::media
   double points = 0;              // over all groups
@@ -63,9 +71,24 @@ struct ReceiverPoints {
   std::span<const Rgb> albedos = {};  // of the surface on the way in (surface_albedo); empty: 1
 };
 
-/// Irradiance E_t transmitted at points into a medium of relative index eta (estimate_irradiance).
-std::vector<Rgb> compute_irradiance(const World& world, const ReceiverPoints& points, float eta, int samples,
-                                    int bounces, std::uint64_t seed, Progress& progress,
-                                    const TranslucentAnswer& answer = {});
+/// How irradiance is estimated (estimate_irradiance).
+struct IrradianceParams {
+  int samples = kDefaultIrradianceSamples;  // per point and light
+  int bounces = 0;
+  double error = 0;        // as BakeParams::irradiance_error
+  bool every_eta = false;  // whether SampleLight::ratios are wanted
+  std::uint64_t seed = 0;
+};
+
+/// Irradiance E_t transmitted at points into a medium of relative index eta, with its standard error: the
+/// samples of a point are up to kIrradianceBatches estimates that are independent of each other, whose spread
+/// tells it; 0 where all light comes from single directions, and empty where a single sample tells nothing.
+/// With params.error, points whose standard error is above that share of their irradiance, or of a hundredth
+/// of all points' mean where that is more, get twice as many samples until it is not, or they have
+/// kMostRefinement times as many.
+SampleLight compute_irradiance(const World& world, const ReceiverPoints& points, float eta,
+                               const IrradianceParams& params, Progress& progress,
+                               const TranslucentAnswer& answer = {});
+inline constexpr int kIrradianceBatches = 4, kMostRefinement = 64;
 
 }  // namespace nacre

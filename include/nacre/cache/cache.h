@@ -11,15 +11,26 @@
 #include <vector>
 
 #include "nacre/base/math.h"
+#include "nacre/optics/eta_change.h"
 
 namespace nacre {
 
+/// What some of the lights send into samples. Any of the vectors may be empty: not known.
+struct SampleLight {
+  std::string name;               // of the lights; empty: all of them
+  std::vector<Rgb> irradiance;    // transmitted irradiance E_t; empty for the only ones
+  std::vector<float> errors;      // standard error of the mean of its channels
+  std::vector<EtaRatios> ratios;  // for other indices of refraction
+};
+
 /// Samples of one group as bake makes them. Positions and normals in scene units and world space; `areas` are
-/// shares of the surface, scene units^2; `irradiance` is the transmitted irradiance E_t.
+/// shares of the surface, scene units^2; `irradiance` is the transmitted irradiance E_t, the sum over
+/// `lights` where these are known.
 struct SurfaceSamples {
   std::vector<Vec3> positions, normals;
   std::vector<float> areas;
   std::vector<Rgb> irradiance;
+  std::vector<SampleLight> lights;
   std::size_t size() const { return positions.size(); }
 };
 
@@ -61,12 +72,23 @@ inline constexpr std::uint32_t kMaxSamplesPerGroup = 0x0fffffffu;
 inline constexpr std::uint32_t kMaxLeafSamples = 8;
 inline constexpr int kMaxOctreeDepth = 21;  // bits of a Morton code per axis
 
+/// The part of a group's irradiance that lights of one name send: one float per sample, in octree order.
+/// Spans are empty where nothing is known; those of successive lights follow each other in memory.
+struct LightPlane {
+  std::string name;  // empty: all of the lights
+  std::array<std::span<const float>, 3> irradiance;
+  std::span<const float> errors;
+  std::span<const EtaRatios> ratios;
+};
+
 /// All shapes that share one subsurface element: they scatter light into each other and into nothing else.
 struct CacheGroup {
   std::string name;
   double surface_area = 0;  // scene units^2
+  double eta = 0;           // relative index for which the irradiance is; 0: not known
   std::array<std::span<const float>, kPlaneCount> planes;
   std::span<const OctreeNode> nodes;
+  std::vector<LightPlane> lights;  // whose sum the irradiance is
 
   std::size_t size() const { return planes[0].size(); }
   std::span<const float> plane(Plane p) const { return planes[static_cast<std::size_t>(p)]; }

@@ -7,9 +7,10 @@
 
 namespace nacre {
 
-inline constexpr std::uint32_t kCacheVersion = 1;
+inline constexpr std::uint32_t kCacheVersion = 2;
 
-/// Writes a cache; the file appears under its name only when complete. Throws Error(kIo, path).
+/// Writes a cache, in version 1 of the format if nothing is known of its lights but their sum; the file
+/// appears under its name only when complete. Throws Error(kIo, path).
 void save_cache(const Cache& cache, const std::string& path);
 
 /// Maps a cache file and checks all of it: structure, checksums, links, and that every number is finite and

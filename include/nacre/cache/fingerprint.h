@@ -8,18 +8,21 @@
 
 namespace nacre {
 
+/// What of a bake counts, beside the scene.
+struct BakeConditions {
+  std::vector<int> bounces;  // by medium
+  bool shadows = true;
+  bool interreflect = false;  // then the coefficients of the media count, too
+  bool every_eta = false;     // then the indices of refraction do not
+};
+
 /// The parts of a scene that a cache depends on: content of each shape, not its file's name ("shape
 /// bunny/geometry"), which group it belongs to, lights ("light key/position"), eta of each medium, shadows,
 /// bounces and, where light bounces, reflectances; with interreflection the coefficients of the media, too.
-/// `bounces[m]` is the number of bounces baked for medium m.
-KeyValues make_fingerprint(const Scene& scene, std::span<const int> bounces, bool shadows,
-                           bool interreflect = false);
+KeyValues make_fingerprint(const Scene& scene, const BakeConditions& conditions);
 
-/// The bounces that a fingerprint was made with, for `groups` media; missing ones are 0.
-std::vector<int> fingerprint_bounces(const KeyValues& fingerprint, std::size_t groups);
-
-/// Whether it was made with interreflection.
-bool fingerprint_interreflects(const KeyValues& fingerprint);
+/// The conditions that a fingerprint was made with, for `groups` media; missing bounces are 0.
+BakeConditions fingerprint_conditions(const KeyValues& fingerprint, std::size_t groups);
 
 /// A 32-digit hash of a group's samples and octree, whatever scene they belong to.
 std::string samples_digest(const CacheGroup& group);

@@ -27,15 +27,13 @@ struct Hit {
   explicit operator bool() const { return mesh != kNoHit; }
 };
 
-/// A bounding volume hierarchy over meshes, which it refers to and which have to outlive it unchanged.
+/// A bounding volume hierarchy over meshes, which it refers to and which have to outlive it unchanged; copies
+/// share it.
 class RayTracer {
  public:
   /// `masks[i]` (all ones if empty) is compared with a ray's mask: a mesh is seen if they share a bit.
   /// Throws Error(kLimit) when Embree runs out of memory, Error(kIo) when it cannot start.
   explicit RayTracer(std::span<const Mesh* const> meshes, std::span<const std::uint32_t> masks = {});
-  ~RayTracer();
-  RayTracer(RayTracer&&) noexcept;
-  RayTracer& operator=(RayTracer&&) noexcept;
 
   /// Nearest hit, both sides of every triangle. Watertight across edges (Embree's robust mode); only a ray
   /// that meets a vertex to the last bit may slip through.
@@ -51,7 +49,7 @@ class RayTracer {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<const Impl> impl_;
 };
 
 /// The point of a hit from the triangle's own vertices, in double precision and then rounded: within half an

@@ -108,6 +108,7 @@ struct Light {
   std::string id, place;
   std::variant<PointLight, DirectionalLight, AreaLight, SpotLight, ConstantLight, EnvironmentMap> model;
   float sampling_weight = 1;  // times the probability to be chosen, where lights are chosen
+  std::string group = {};     // lights of one group are kept and scaled as one; empty: by itself
 };
 /// Whether light arrives from a single direction.
 bool is_delta(const Light& light);
@@ -186,6 +187,10 @@ int irradiance_bounces(const Scene& scene, std::size_t medium, std::optional<int
 std::vector<std::uint32_t> shapes_of_medium(const Scene& scene, std::size_t medium);
 /// Name for messages: id or "light 2".
 std::string light_name(const Scene& scene, std::size_t light);
+/// Name by which a bake keeps a light apart from others: its group, or its own.
+std::string light_plane_name(const Scene& scene, std::size_t light);
+/// Multiplies what a light emits.
+void scale_light(Light& light, const Rgb& scale);
 std::string medium_name(const Scene& scene, std::size_t medium);
 /// The same as part of a sentence: "medium 'wax'" or "medium 2".
 std::string medium_label(const Scene& scene, std::size_t medium);

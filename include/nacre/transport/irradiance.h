@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "nacre/transport/path.h"
 
@@ -24,5 +25,11 @@ struct Receiver {
 /// many.
 Rgb estimate_irradiance(const World& world, const Receiver& at, int samples, int bounces, std::uint64_t key,
                         std::uint32_t first_sample = 0, const TranslucentAnswer& answer = {});
+
+/// The same light as it enters media of several indices (that of the receiver is not used): `irradiance[i]`
+/// for `etas[i]`.
+void estimate_irradiances(const World& world, const Receiver& at, std::span<const float> etas, int samples,
+                          int bounces, std::uint64_t key, const TranslucentAnswer& answer,
+                          std::span<Rgb> irradiance);
 
 }  // namespace nacre

@@ -10,7 +10,8 @@
 
 namespace nacre {
 
-/// Everything that tracing light needs. The scene has to outlive it unchanged.
+/// Everything that tracing light needs; copies share the acceleration structure. The scene has to outlive it
+/// unchanged.
 struct World {
   const Scene* scene;
   RayTracer tracer;         // mesh i is Scene::shapes[i]
@@ -19,7 +20,9 @@ struct World {
   bool shadows = true;
   std::vector<std::uint8_t> clear_glass;  // by shape: whether light passes straight through (see_light)
   bool has_glass = false;                 // any of them
+  std::vector<std::uint8_t> muted = {};   // by light: whether it sends nothing; empty: all send
 
+  bool sends(std::size_t light) const { return muted.empty() || !muted[light]; }
   const Shape& shape(const Hit& hit) const { return scene->shapes[hit.mesh]; }
 };
 

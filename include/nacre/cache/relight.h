@@ -1,0 +1,31 @@
+// Baked light for other indices of refraction, with lights dimmed or coloured.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "nacre/cache/cache.h"
+
+namespace nacre {
+
+/// By how much the lights of a plane (LightPlane::name) are multiplied.
+struct LightScale {
+  std::string name;
+  Rgb scale;
+};
+
+/// Whether a group's irradiance can be had for a relative index of refraction.
+bool serves_eta(const CacheGroup& group, double eta) noexcept;
+
+/// Makes the irradiance of each group that for an index of refraction (`etas[g]`, which it has to serve),
+/// with lights scaled; those that `scales` does not name stay as they are. Afterwards a group has one plane
+/// of light. A group of which nothing changes is left alone, and so the numbers of a cache that is used as it
+/// was baked are those of the file.
+void relight(Cache& cache, std::span<const double> etas, std::span<const LightScale> scales);
+
+/// Standard error of the mean channel of a sample's irradiance, of all lights together; 0 where none is
+/// known.
+float irradiance_error(const CacheGroup& group, std::size_t sample) noexcept;
+
+}  // namespace nacre

@@ -1,0 +1,148 @@
+// Choosing and scaling baked light.
+#include "cached_light.h"
+
+#include <charconv>
+
+#include "common.h"
+#include "nacre/base/math.h"
+#include "nacre/cache/blotch.h"
+#include "nacre/cache/cache_file.h"
+#include "nacre/cache/fingerprint.h"
+#include "nacre/cache/relight.h"
+
+namespace nacre::tools {
+namespace {
+
+constexpr float kMostScale = 1e9f;
+
+// "2" or "1,0.5,0"
+std::optional<Rgb> parse_scale(const std::string& text) {
+  std::vector<float> values;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (;;) {
+    float value = 0;
+    const auto parsed = std::from_chars(at, end, value);
+    if (parsed.ec != std::errc() || !(value >= 0 && value <= kMostScale)) return std::nullopt;
+    values.push_back(value);
+    if (parsed.ptr == end) break;
+    if (*parsed.ptr != ',') return std::nullopt;
+    at = parsed.ptr + 1;
+  }
+  if (values.size() == 1) return Rgb(values[0], values[0], values[0]);
+  if (values.size() == 3) return Rgb(values[0], values[1], values[2]);
+  return std::nullopt;
+}
+
+std::string names_of_lights(const Scene& scene) {
+  std::string names;
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    names += (i > 0 ? ", '" : "'") + light_name(scene, i) + "'";
+    if (!scene.lights[i].group.empty()) names += " (of '" + scene.lights[i].group + "')";
+  }
+  return names.empty() ? "no light" : names;
+}
+
+// The scale of each of a group's planes of light. Those that share one cannot be scaled apart.
+std::vector<LightScale> scale_planes(const CacheGroup& group, const Scene& scene,
+                                     const std::vector<Rgb>& light_scales, const std::string& path) {
+  std::vector<LightScale> scales;
+  const auto plane_of = [&](std::size_t light) {
+    const std::string name = light_plane_name(scene, light);
+    const bool apart = std::ranges::find(group.lights, name, &LightPlane::name) != group.lights.end();
+    return apart ? name : std::string();
+  };
+  for (std::size_t i = 0; i < light_scales.size(); ++i) {
+    const std::string plane = plane_of(i);
+    const auto found = std::ranges::find(scales, plane, &LightScale::name);
+    if (found == scales.end())
+      scales.push_back({plane, light_scales[i]});
+    else if (found->scale != light_scales[i])
+      fail(ErrorCode::kMismatch, path, "--light: the cache does not keep {} apart; {}",
+           plane.empty() ? "its lights" : "the lights of '" + plane + "'",
+           plane.empty() ? "bake it with --per-light" : "scale them alike, or bake them without their group");
+  }
+  // Imported and older caches know of no lights.
+  if (group.lights.empty() && !scales.empty() && scales[0].scale != Rgb(1, 1, 1))
+    fail(ErrorCode::kMismatch, path, "--light: the cache does not know its lights; bake it with --per-light");
+  return scales;
+}
+
+}  // namespace
+
+std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments) {
+  std::vector<Rgb> scales(scene.lights.size(), Rgb(1, 1, 1));
+  for (const std::string& argument : arguments) {
+    const std::size_t equals = argument.rfind('=');
+    const std::optional<Rgb> scale =
+        equals == std::string::npos ? std::nullopt : parse_scale(argument.substr(equals + 1));
+    if (!scale)
+      throw UsageError("--light " + argument + ": write it as ID=SCALE or ID=r,g,b, numbers from 0 to 1e9");
+    const std::string id = argument.substr(0, equals);
+    bool found = false;
+    for (std::size_t i = 0; i < scales.size(); ++i)
+      if (light_name(scene, i) == id || scene.lights[i].group == id) {
+        scales[i] = *scale;
+        found = true;
+      }
+    if (!found || id.empty())
+      fail(ErrorCode::kValue, "--light", "no light has the id '{}'; there is {}", id, names_of_lights(scene));
+  }
+  return scales;
+}
+
+void scale_lights(Scene& scene, const std::vector<Rgb>& scales) {
+  for (std::size_t i = 0; i < scales.size(); ++i)
+    if (scales[i] != Rgb(1, 1, 1)) scale_light(scene.lights[i], scales[i]);
+}
+
+Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,
+                          const std::vector<Rgb>& light_scales, Report& report) {
+  const StageTimer timer(report, "read_cache");
+  Cache cache = load_cache(path);
+  BakeConditions conditions = fingerprint_conditions(cache.fingerprint, scene.media.size());
+  conditions.shadows = shadows;
+  const std::string mismatch = describe_mismatch(cache.fingerprint, make_fingerprint(scene, conditions));
+  if (!mismatch.empty() || cache.groups.size() != scene.media.size())
+    fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
+         mismatch.empty() ? "the number of translucent groups differs" : mismatch);
+  std::vector<double> etas;
+  std::vector<LightScale> scales;
+  for (std::size_t m = 0; m < cache.groups.size(); ++m) {
+    const CacheGroup& group = cache.groups[m];
+    // With eta in the fingerprint it is the one that was baked.
+    etas.push_back(conditions.every_eta ? double{scene.media[m].eta()} : group.eta);
+    if (!serves_eta(group, etas[m]))
+      fail(ErrorCode::kMismatch, path,
+           "the cache holds irradiance for indices of refraction from {} to {}, and that of {} is {:.6g}; "
+           "bake "
+           "it again",
+           kLeastEta, kMostEta, medium_label(scene, m), etas[m]);
+    scales = scale_planes(group, scene, light_scales, path);
+  }
+  relight(cache, etas, scales);
+  return cache;
+}
+
+// Says where a material is too fine-grained for the cache, and what would serve.
+Warnings check_density(const Scene& scene, const Cache& cache) {
+  Warnings warnings;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const Medium& medium = scene.media[m];
+    if (medium.lambert) continue;  // uses no samples
+    const CacheGroup& group = cache.groups[m];
+    const double spacing =
+        hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * medium.scale;
+    const double length = smallest_mean_free_path(medium);
+    const double blotch = predict_blotch(spacing / length);
+    if (blotch > kAcceptableBlotch)
+      warnings.push_back(
+          fmt::format("{}: the samples of {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
+                      "blotches of {:.1f} %; --spacing {:.3g} would serve",
+                      medium.place, medium_label(scene, m), spacing, spacing / length, 100 * blotch,
+                      kDefaultSpacing * length));
+  }
+  return warnings;
+}
+
+}  // namespace nacre::tools

@@ -1,0 +1,29 @@
+// Light from a cache: whether it is that of a scene, dense enough, and with which lights.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nacre/base/report.h"
+#include "nacre/cache/cache.h"
+#include "nacre/scene/scene.h"
+
+namespace nacre::tools {
+
+/// What the arguments of --light ("ID=SCALE", "ID=r,g,b"; the id of a light or of a group) come to, for each
+/// light of the scene. Throws UsageError for what cannot be read, Error(kValue) for an id that no light has.
+std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments);
+
+/// Multiplies what the lights send.
+void scale_lights(Scene& scene, const std::vector<Rgb>& scales);
+
+/// Loads a cache and makes its irradiance that of the scene: its indices of refraction, its lights scaled.
+/// Throws Error(kMismatch, path) for a cache of another scene, saying what differs, and where lights were
+/// baked together that are to be scaled apart; and what load_cache throws.
+Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,
+                          const std::vector<Rgb>& light_scales, Report& report);
+
+/// Says where a material is too fine-grained for a cache, and what would serve.
+Warnings check_density(const Scene& scene, const Cache& cache);
+
+}  // namespace nacre::tools
