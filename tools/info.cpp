@@ -7,6 +7,7 @@
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
+#include "nacre/cache/relight.h"
 #include "nacre/geometry/mesh_file.h"
 #include "nacre/geometry/topology.h"
 #include "nacre/render/image_file.h"
@@ -71,6 +72,40 @@ void show_exitance(const std::string& path) {
   }
 }
 
+// The standard errors of samples: what they come to in the mean of all, and the worst of one that is not
+// dark.
+void show_lights(const CacheGroup& group, double mean_irradiance) {
+  if (group.lights.empty()) return;
+  std::string names;
+  bool errors = true, ratios = true;
+  for (const LightPlane& light : group.lights) {
+    if (!light.name.empty()) names += (names.empty() ? "'" : ", '") + light.name + "'";
+    errors = errors && !light.errors.empty();
+    ratios = ratios && !light.ratios.empty();
+  }
+  fmt::print(
+      "  lights {}; for {}\n", names.empty() ? "together" : "apart: " + names,
+      ratios ? fmt::format("eta {} to {}", kLeastEta, kMostEta) : fmt::format("eta {:.6g}", group.eta));
+  if (!errors) {
+    fmt::print("  standard error of the irradiance not known (one irradiance sample)\n");
+    return;
+  }
+  std::vector<float> relative;
+  for (std::size_t i = 0; i < group.size(); ++i)
+    if (const double e = double{mean_channel(group.irradiance(i))}; e > 0.01 * mean_irradiance)
+      relative.push_back(static_cast<float>(double{irradiance_error(group, i)} / e));
+  if (relative.empty()) return;
+  std::ranges::sort(relative);
+  const auto at = [&](double share) {
+    return 100 * double{relative[static_cast<std::size_t>(share * static_cast<double>(relative.size() - 1))]};
+  };
+  fmt::print(
+      "  standard error of the irradiance: {:.3g} % of it (median), {:.3g} % (one sample in a hundred "
+      "exceeds "
+      "it), {:.3g} % at most\n",
+      at(0.5), at(0.99), at(1));
+}
+
 void show_group(const CacheGroup& group, const KeyValues& info) {
   fmt::print("group {}\n", group.name);
   fmt::print("  {} samples, {} octree nodes, surface {:.6g} scene units^2\n", group.size(),
@@ -99,11 +134,12 @@ void show_group(const CacheGroup& group, const KeyValues& info) {
   fmt::print("  mean transmitted irradiance {:.5g} {:.5g} {:.5g}; {:.1f} % of the samples are dark\n",
              power[0] / area, power[1] / area, power[2] / area,
              100.0 * static_cast<double>(dark) / static_cast<double>(group.size()));
+  show_lights(group, (power[0] + power[1] + power[2]) / (3 * area));
 }
 
 void show_cache(const std::string& path) {
   const Cache cache = load_cache(path);
-  fmt::print("cache {}: format version {}, sound\n", path, kCacheVersion);
+  fmt::print("cache {}: sound\n", path);
   for (const CacheGroup& group : cache.groups) show_group(group, cache.info);
   fmt::print("recorded\n");
   for (const auto& [key, value] : cache.info) fmt::print("  {}: {}\n", key, value);

@@ -37,7 +37,7 @@ Method method_of(const Options& options) {
 
 AovSelection parse_aovs(const std::string& text) {
   if (text == "all") return {};
-  AovSelection selection{false, false, false, false, false};
+  AovSelection selection{false, false, false, false, false, false, false};
   if (text == "none") return selection;
   std::size_t begin = 0;
   while (begin <= text.size()) {
@@ -53,9 +53,14 @@ AovSelection parse_aovs(const std::string& text) {
       selection.depth = true;
     else if (name == "object")
       selection.object_id = true;
+    else if (name == "irradiance")
+      selection.irradiance = true;
+    else if (name == "irradiance_error")
+      selection.irradiance_error = true;
     else
       throw UsageError("--aov " + name +
-                       ": use none, all, or a list of layers, position, normal, depth, object");
+                       ": use none, all, or a list of layers, position, normal, depth, object, irradiance, "
+                       "irradiance_error");
     begin = end + 1;
   }
   return selection;
@@ -141,6 +146,10 @@ void check_combination(const Options& options) {
     throw UsageError("--tolerance is that of --method hierarchical; " + options.method + " has none");
   if (!options.exitance.empty() && options.tolerance == 0.0)
     throw UsageError("--exitance keeps what is interpolated; --tolerance 0 sums up every pixel by itself");
+  const AovSelection aovs = parse_aovs(options.aovs);
+  if ((aovs.irradiance || aovs.irradiance_error) && !uses_cache(method))
+    throw UsageError("--aov irradiance shows the samples of a cache, and --method " + options.method +
+                     " uses none");
   if (options.single_samples.value_or(0) > 0 && method == Method::kLambert)
     throw UsageError("--single-samples: an opaque surface, as --method lambert takes it, has no inside");
 }
@@ -365,7 +374,8 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
           "Measure the error of the hierarchical sum at this many random pixels against the exact one")
       ->check(CLI::Range(1, 1 << 24));
   command->add_option("--aov", options->aovs,
-                      "none, all (default), or a list of layers, position, normal, depth, object");
+                      "none, all (default), or a list of layers, position, normal, depth, object; "
+                      "beside these irradiance, irradiance_error (of the baked samples)");
   command->add_flag("--png", options->png, "Write an sRGB preview beside the OpenEXR file");
   command->add_option("--exposure", options->exposure, "Of the preview, in stops, or auto (default: 0)");
   add_bake_options(*command, options->bake);

@@ -136,6 +136,11 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels)
     pixels.normal[index] = point.shading_normal;
     pixels.depth[index] = path.hit.t;
     pixels.object_id[index] = static_cast<float>(path.hit.mesh + 1);
+    const int medium = world_.shape(path.hit).medium;
+    if (medium == kNone || (pixels.irradiance.empty() && pixels.irradiance_error.empty())) continue;
+    const BakedLight baked = media_[static_cast<std::size_t>(medium)].nearest_light(point);
+    if (!pixels.irradiance.empty()) pixels.irradiance[index] = baked.irradiance;
+    if (!pixels.irradiance_error.empty()) pixels.irradiance_error[index] = baked.error;
   }
 }
 

@@ -3,7 +3,8 @@
 
 namespace nacre {
 
-PixelBuffer::PixelBuffer(int buffer_width, int buffer_height) : width(buffer_width), height(buffer_height) {
+PixelBuffer::PixelBuffer(int buffer_width, int buffer_height, const AovSelection& aovs)
+    : width(buffer_width), height(buffer_height) {
   const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (auto& layer : layers) layer.assign(count, Rgb(0, 0, 0));
   weight.assign(count, 0.0f);
@@ -12,6 +13,8 @@ PixelBuffer::PixelBuffer(int buffer_width, int buffer_height) : width(buffer_wid
   normal.assign(count, Vec3(0, 0, 0));
   depth.assign(count, 0.0f);
   object_id.assign(count, 0.0f);
+  if (aovs.irradiance) irradiance.assign(count, Rgb(0, 0, 0));
+  if (aovs.irradiance_error) irradiance_error.assign(count, 0.0f);
 }
 
 Image PixelBuffer::make_image(const RenderParams& params) const {
@@ -55,6 +58,10 @@ Image PixelBuffer::make_image(const RenderParams& params) const {
       add(fmt::format("normal.{}", kXyzNames[k]), [&](std::size_t i) { return normal[i][k]; });
   }
   if (params.aovs.depth) add("depth.Z", [&](std::size_t i) { return depth[i]; });
+  for (int k = 0; k < 3 && params.aovs.irradiance; ++k)
+    add(fmt::format("irradiance.{}", kRgbNames[k]), [&](std::size_t i) { return irradiance[i][k]; });
+  if (params.aovs.irradiance_error)
+    add("irradiance_error.Y", [&](std::size_t i) { return irradiance_error[i]; });
   if (params.aovs.object_id) add("object.id", [&](std::size_t i) { return object_id[i]; });
   return image;
 }

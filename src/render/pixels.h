@@ -13,7 +13,7 @@ enum class Layer : std::uint8_t { kDiffusion, kSingle, kSpecular, kSurface };
 inline constexpr std::size_t kLayerCount = 4;
 
 struct PixelBuffer {
-  PixelBuffer(int buffer_width, int buffer_height);
+  PixelBuffer(int buffer_width, int buffer_height, const AovSelection& aovs);
 
   int width, height;
   std::array<std::vector<Rgb>, kLayerCount> layers;
@@ -21,6 +21,8 @@ struct PixelBuffer {
   std::vector<float> coverage;  // and of those that hit anything
   std::vector<Vec3> position, normal;
   std::vector<float> depth, object_id;
+  std::vector<Rgb> irradiance;  // empty where it is not asked for
+  std::vector<float> irradiance_error;
 
   void add(Layer layer, std::uint32_t pixel, const Rgb& value) {
     layers[static_cast<std::size_t>(layer)][pixel] += value;

@@ -102,7 +102,7 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
 
 Image Renderer::render(const RenderParams& params, Progress& progress, Report& report,
                        Warnings& warnings) const {
-  PixelBuffer pixels(params.crop_width, params.crop_height);
+  PixelBuffer pixels(params.crop_width, params.crop_height, params.aovs);
   Totals totals(media_.size());
   const Stopwatch watch;
   const PixelLoop loop(world_, media_, params);

@@ -3,6 +3,8 @@
 
 #include "nacre/base/random.h"
 #include "nacre/cache/fingerprint.h"
+#include "nacre/cache/nearest.h"
+#include "nacre/cache/relight.h"
 #include "nacre/optics/profile.h"
 #include "nacre/transport/irradiance.h"
 
@@ -142,6 +144,12 @@ void Translucency::eval_exitance(std::span<const Hit> hits, std::span<Rgb> exita
   else
     exitance_->eval(positions, exitance, evaluations);
   exitance_->eval_exact(positions, exact, evaluations);
+}
+
+BakedLight Translucency::nearest_light(const SurfacePoint& point) const noexcept {
+  if (!exitance_ || group_->size() == 0) return {};
+  const std::size_t sample = find_nearest_sample(*group_, point.position, point.geometric_normal);
+  return {group_->irradiance(sample), irradiance_error(*group_, sample)};
 }
 
 Rgb Translucency::lambert_exitance(const ExitPoint& point) const {

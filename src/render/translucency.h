@@ -25,6 +25,12 @@ struct ExitPoint {
   std::uint32_t sample;  // of the pixel
 };
 
+/// Irradiance of a sample, and the standard error of its mean channel.
+struct BakedLight {
+  Rgb irradiance{0, 0, 0};
+  float error = 0;
+};
+
 class Translucency {
  public:
   /// `group` is read where the method needs it, else it may be nullptr.
@@ -53,6 +59,8 @@ class Translucency {
   }
   /// M_o of kHierarchical at hits, and the sum over every sample that it stands for.
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
+  /// What the cache's nearest sample has received; nothing without a cache.
+  BakedLight nearest_light(const SurfacePoint& point) const noexcept;
   bool has_single_scattering() const { return single_.has_value(); }
   Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
 

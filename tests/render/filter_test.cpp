@@ -12,7 +12,7 @@ namespace {
 Image render_quietly(const Scene& scene, int samples) {
   RenderParams params = default_render_params(scene, 0);
   params.samples_per_pixel = samples;
-  params.aovs = {false, false, true, true, false};
+  params.aovs = {false, false, true, true, false, false, false};
   Progress progress;
   Report report;
   Warnings warnings;

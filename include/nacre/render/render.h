@@ -25,6 +25,9 @@ inline bool uses_cache(Method method) { return method == Method::kHierarchical |
 struct AovSelection {
   bool layers = true;  // diffusion, single, specular, surface
   bool position = true, normal = true, depth = true, object_id = true;
+  // Of the cache's sample that is nearest to where the first sample of a pixel sees a translucent surface:
+  // E_t, and the standard error of its mean channel. Of methods that use a cache.
+  bool irradiance = false, irradiance_error = false;
 };
 
 struct RenderParams {
