@@ -124,6 +124,37 @@ Cache load_matching_cache(const std::string& path, const Scene& scene, bool shad
   return cache;
 }
 
+std::vector<std::string> find_new_lights(const std::string& path, const Cache& cache, const Scene& scene,
+                                         bool shadows) {
+  BakeConditions conditions = fingerprint_conditions(cache.fingerprint, scene.media.size());
+  conditions.shadows = shadows;
+  // What is new of lights alone may be.
+  KeyValues old_part;
+  for (const auto& entry : make_fingerprint(scene, conditions)) {
+    const bool known = std::ranges::find(cache.fingerprint, entry.first, &KeyValues::value_type::first) !=
+                       cache.fingerprint.end();
+    if (known || !entry.first.starts_with("light ")) old_part.push_back(entry);
+  }
+  const std::string mismatch = describe_mismatch(cache.fingerprint, old_part);
+  if (!mismatch.empty())
+    fail(ErrorCode::kMismatch, path, "--add-lights: more than lights has changed: {}; bake it again",
+         mismatch);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const std::string prefix = "light " + light_name(scene, i) + "/", plane = light_plane_name(scene, i);
+    const bool baked = std::ranges::any_of(
+        cache.fingerprint, [&](const auto& entry) { return entry.first.starts_with(prefix); });
+    if (baked) continue;
+    for (const CacheGroup& group : cache.groups)
+      if (std::ranges::find(group.lights, plane, &LightPlane::name) != group.lights.end())
+        fail(ErrorCode::kMismatch, path, "--add-lights: the plane '{}' is there, without {}; bake it again",
+             plane, light_name(scene, i));
+    if (std::ranges::find(names, plane) == names.end()) names.push_back(plane);
+  }
+  if (names.empty()) fail(ErrorCode::kValue, path, "--add-lights: the cache has all lights of the scene");
+  return names;
+}
+
 // Says where a material is too fine-grained for the cache, and what would serve.
 Warnings check_density(const Scene& scene, const Cache& cache) {
   Warnings warnings;

@@ -23,6 +23,12 @@ void scale_lights(Scene& scene, const std::vector<Rgb>& scales);
 Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,
                           const std::vector<Rgb>& light_scales, Report& report);
 
+/// The planes of light that a scene has and a cache lacks, which is that of the same scene without them.
+/// Throws Error(kMismatch, path) where it is not, or a light is in a plane that is there already, or comes
+/// with a new shape, which may shade what was baked; Error(kValue, path) if there is nothing to add.
+std::vector<std::string> find_new_lights(const std::string& path, const Cache& cache, const Scene& scene,
+                                         bool shadows);
+
 /// Says where a material is too fine-grained for a cache, and what would serve.
 Warnings check_density(const Scene& scene, const Cache& cache);
 

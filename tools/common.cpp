@@ -82,6 +82,16 @@ CLI::Validator finite_number() {
           ""};
 }
 
+CLI::Validator positive_number() {
+  return {[](std::string& text) {
+            double value = 0;
+            if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value) || !(value > 0))
+              return text + " is not a number above 0";
+            return std::string();
+          },
+          ""};
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--threads", options.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
@@ -130,13 +140,11 @@ Scene load_scene(const SceneOptions& options, Session& session) {
 
 void add_bake_options(CLI::App& command, BakeOptions& options) {
   auto* points = command.add_option("--points", options.points, "Total number of samples, about")
-                     ->check(CLI::PositiveNumber)
-                     ->check(finite_number());
+                     ->check(positive_number());
   command
       .add_option("--spacing", options.spacing,
                   "Distance of samples in mm (default: 0.65 of the smallest mean free path)")
-      ->check(CLI::PositiveNumber)
-      ->check(finite_number())
+      ->check(positive_number())
       ->excludes(points);
   command
       .add_option("--irradiance-samples", options.irradiance_samples,

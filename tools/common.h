@@ -52,6 +52,8 @@ class Session {
 
 /// Accepts what is neither nan nor infinite.
 CLI::Validator finite_number();
+/// And above 0.
+CLI::Validator positive_number();
 void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// A scene file, or a mesh file with a material and a height.

@@ -5,8 +5,8 @@
 
 #include "bake/area_shares.h"
 #include "bake/group_surface.h"
+#include "bake/illumination.h"
 #include "bake/placement.h"
-#include "bake/translucent_radiance.h"
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "nacre/base/version.h"
@@ -17,8 +17,6 @@
 namespace nacre {
 namespace {
 
-// Rounds of light between translucent objects.
-constexpr int kInterreflections = 2;
 // Per sample in the file: ten planes and its part of the nodes, about one to five samples; and for each plane
 // of light that there are several of its irradiance, then errors, then ratios.
 double bytes_per_sample(std::size_t lights, bool every_eta) {
@@ -63,14 +61,6 @@ KeyValues make_info(const Scene& scene, const BakePlan& plan, const BakeParams& 
   }
   return info;
 }
-
-// Samples without irradiance yet, and the size of the triangle that each lies on.
-struct PlacedSamples {
-  SurfaceSamples samples;
-  std::vector<float> extents;
-  std::vector<Rgb> albedos;  // on the way in; empty where the surface is white
-  double surface_area = 0;
-};
 
 // Weights of a triangle's second and third vertex at a point of it.
 Vec2 barycentric(const Mesh& mesh, const Triangle& t, const Vec3& position) {
@@ -183,15 +173,19 @@ bool keeps_every_eta(const Scene& scene, const BakeParams& params) {
 
 namespace {
 
-// Octrees over all groups; `storage` owns them.
-std::vector<CacheGroup> build_groups(const BakePlan& plan, std::span<const double> areas,
-                                     std::vector<SurfaceSamples> samples,
-                                     std::vector<std::shared_ptr<const void>>& storage, Report& report) {
-  const StageTimer timer(report, "build_octree");
-  std::vector<CacheGroup> groups;
-  for (std::size_t m = 0; m < samples.size(); ++m)
-    groups.push_back(build_group(plan.groups[m].name, areas[m], std::move(samples[m]), storage));
-  return groups;
+// All that the numbers of a bake depend on, as a hash.
+std::string journal_key(KeyValues fingerprint, const Scene& scene, const BakePlan& plan,
+                        const BakeParams& params) {
+  fingerprint.emplace_back("version", kVersion);
+  fingerprint.emplace_back("seed", fmt::format("{}", params.seed));
+  fingerprint.emplace_back("error", fmt::format("{}", params.irradiance_error));
+  fingerprint.emplace_back("per light", params.per_light ? "yes" : "no");
+  for (const GroupPlan& group : plan.groups)
+    fingerprint.emplace_back("group", fmt::format("{} {}", group.points, group.irradiance_samples));
+  for (const Medium& medium : scene.media) fingerprint.emplace_back("eta", fmt::format("{}", medium.eta()));
+  for (const Light& light : scene.lights)
+    fingerprint.emplace_back("light", fmt::format("{} {}", light.sampling_weight, light.group));
+  return fingerprint_digest(fingerprint);
 }
 
 // The world as it is with the lights of one name only.
@@ -203,58 +197,6 @@ World with_lights_of(const World& world, const std::string& name) {
     only.muted[i] = light_plane_name(*world.scene, i) != name;
   return only;
 }
-
-// What the lights of a world send into each group.
-class Illumination {
- public:
-  Illumination(const BakePlan& plan, const BakeParams& params, std::span<const PlacedSamples> placed,
-               Progress& progress, Report& report)
-      : plan_(plan), params_(params), placed_(placed), progress_(progress), report_(report) {}
-
-  std::vector<SampleLight> compute(const World& world) const {
-    std::vector<SampleLight> lights = compute_once(world, {});
-    for (int round = 0; params_.interreflect && round < kInterreflections; ++round) {
-      std::vector<std::shared_ptr<const void>> storage;
-      std::vector<SurfaceSamples> samples;
-      std::vector<double> areas;
-      for (std::size_t m = 0; m < placed_.size(); ++m) {
-        samples.push_back(placed_[m].samples);
-        samples[m].lights.clear();
-        samples[m].irradiance = std::move(lights[m].irradiance);
-        areas.push_back(placed_[m].surface_area);
-      }
-      const std::vector<CacheGroup> groups = build_groups(plan_, areas, std::move(samples), storage, report_);
-      const TranslucentRadiance radiance = [&] {
-        const StageTimer timer(report_, "diffusion");
-        return TranslucentRadiance(world, groups, progress_);
-      }();
-      lights = compute_once(world, std::cref(radiance));
-    }
-    return lights;
-  }
-
- private:
-  std::vector<SampleLight> compute_once(const World& world, const TranslucentAnswer& answer) const {
-    const StageTimer timer(report_, "irradiance");
-    std::vector<SampleLight> lights;
-    for (std::size_t m = 0; m < placed_.size(); ++m) {
-      const PlacedSamples& placed = placed_[m];
-      lights.push_back(compute_irradiance(
-          world, {placed.samples.positions, placed.samples.normals, placed.extents, placed.albedos},
-          world.scene->media[m].eta(),
-          {plan_.groups[m].irradiance_samples, plan_.groups[m].bounces, params_.irradiance_error,
-           keeps_every_eta(*world.scene, params_), hash_words(params_.seed, m, 1)},
-          progress_, answer));
-    }
-    return lights;
-  }
-
-  const BakePlan& plan_;
-  const BakeParams& params_;
-  std::span<const PlacedSamples> placed_;
-  Progress& progress_;
-  Report& report_;
-};
 
 // The irradiance of samples from what their lights send.
 void add_up_lights(SurfaceSamples& samples) {
@@ -285,9 +227,21 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
     bounces.push_back(plan.groups[m].bounces);
     areas.push_back(placed[m].surface_area);
   }
-  const Illumination illumination(plan, params, placed, progress, report);
-  for (const std::string& name : light_planes(scene, params.per_light)) {
-    std::vector<SampleLight> lights = illumination.compute(with_lights_of(world, name));
+  KeyValues fingerprint = [&] {
+    const StageTimer timer(report, "fingerprint");
+    return make_fingerprint(scene,
+                            {bounces, world.shadows, params.interreflect, keeps_every_eta(scene, params)});
+  }();
+  Journal journal(params.journal, journal_key(fingerprint, scene, plan, params), params.journal_after);
+  if (journal.found() > 0) progress.say("going on with the bake that " + params.journal + " is of");
+  Illumination illumination(plan, params, placed, journal, progress, report);
+  const std::vector<std::string> names = light_planes(scene, params.per_light);
+  for (std::size_t plane = 0; plane < names.size(); ++plane) {
+    const std::string& name = names[plane];
+    if (!params.only_lights.empty() &&
+        std::ranges::find(params.only_lights, name) == params.only_lights.end())
+      continue;
+    std::vector<SampleLight> lights = illumination.compute(with_lights_of(world, name), plane);
     for (std::size_t m = 0; m < placed.size(); ++m) {
       lights[m].name = name;
       placed[m].samples.lights.push_back(std::move(lights[m]));
@@ -308,9 +262,7 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
     report.counts["points"] += group.size();
     report.counts["octree_nodes"] += group.nodes.size();
   }
-  const StageTimer timer(report, "fingerprint");
-  cache.fingerprint =
-      make_fingerprint(scene, {bounces, world.shadows, params.interreflect, keeps_every_eta(scene, params)});
+  cache.fingerprint = std::move(fingerprint);
   cache.info = make_info(scene, plan, params, cache.groups);
   cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
   return cache;

@@ -1,12 +1,16 @@
 // Transmitted irradiance at samples, and how certain it is.
 #include "nacre/transport/irradiance.h"
 
+#include "bake/journal.h"
 #include "nacre/bake/bake.h"
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 
 namespace nacre {
 namespace {
+
+// Points that are computed, and kept in the journal, together.
+constexpr std::size_t kChunk = 512;
 
 // Points whose irradiance is below this share of the mean are as good as dark.
 constexpr double kDarkShare = 0.01;
@@ -92,34 +96,47 @@ SampleLight compute_irradiance(const World& world, const ReceiverPoints& points,
     if (knows_error) light.errors[i] = static_cast<float>(error);
     if (params.every_eta) light.ratios[i] = encode_eta_ratios(std::span(mean).subspan<1, kEtaNodes.size()>());
   };
-  progress.begin("computing irradiance", "samples", count);
-  parallel_for(count, 256, [&](std::size_t begin, std::size_t end) {
+  // In chunks that are the same in every run of a bake, each computed or found in the journal.
+  const auto for_each_point = [&](const char* stage, std::uint64_t pass, const auto& compute) {
+    progress.begin(stage, "samples", count);
+    parallel_for((count + kChunk - 1) / kChunk, 1, [&](std::size_t first, std::size_t last) {
+      for (std::size_t chunk = first; chunk < last; ++chunk) {
+        const std::size_t begin = chunk * kChunk, size = std::min(kChunk, count - begin);
+        const auto bytes = [&](auto& values) {
+          return std::as_writable_bytes(values.empty() ? std::span(values)
+                                                       : std::span(values).subspan(begin, size));
+        };
+        const std::array<std::span<std::byte>, 3> parts{bytes(light.irradiance), bytes(light.errors),
+                                                        bytes(light.ratios)};
+        if (!params.journal || !params.journal->restore({pass, begin}, parts)) {
+          for (std::size_t i = begin; i < begin + size; ++i) compute(i);
+          const std::array<std::span<const std::byte>, 3> done{parts[0], parts[1], parts[2]};
+          if (params.journal) params.journal->keep({pass, begin}, done);
+        }
+        progress.advance(size);
+      }
+    });
+    progress.end();
+  };
+  for_each_point("computing irradiance", 2 * params.pass, [&](std::size_t i) {
     Estimates mean;
-    for (std::size_t i = begin; i < end; ++i) {
-      const double error = estimate(i, params.samples, mean);
-      keep(i, mean, error);
-    }
-    progress.advance(end - begin);
+    const double error = estimate(i, params.samples, mean);
+    keep(i, mean, error);
   });
-  progress.end();
   if (!(params.error > 0) || !estimate.is_random() || !knows_error) return light;
 
   double sum = 0;
   for (const Rgb& e : light.irradiance) sum += double{mean_channel(e)};
   const double dark = kDarkShare * sum / static_cast<double>(count);
-  progress.begin("refining irradiance", "samples", count);
-  parallel_for(count, 64, [&](std::size_t begin, std::size_t end) {
-    Estimates mean;
-    for (std::size_t i = begin; i < end; ++i)
-      for (int factor = 2; factor <= kMostRefinement; factor *= 2) {
-        const double allowed = params.error * std::max(double{mean_channel(light.irradiance[i])}, dark);
-        if (double{light.errors[i]} <= allowed) break;
-        const double error = estimate(i, factor * params.samples, mean);
-        keep(i, mean, error);
-      }
-    progress.advance(end - begin);
+  for_each_point("refining irradiance", 2 * params.pass + 1, [&](std::size_t i) {
+    for (int factor = 2; factor <= kMostRefinement; factor *= 2) {
+      const double allowed = params.error * std::max(double{mean_channel(light.irradiance[i])}, dark);
+      if (double{light.errors[i]} <= allowed) break;
+      Estimates mean;
+      const double error = estimate(i, factor * params.samples, mean);
+      keep(i, mean, error);
+    }
   });
-  progress.end();
   return light;
 }
 

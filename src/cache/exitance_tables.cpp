@@ -34,12 +34,23 @@ constexpr double kMiddlesTolerance = 0.005;
 
 constexpr float kNoLimit = 1e30f;
 
+// How fast a profile falls far away, per scene unit, in the channel where it does so fastest: within a mean
+// free path if light is absorbed rather than scattered. In the dark the sum is then a few nodes, whose errors
+// do not cancel.
+double decay(const std::array<Profile, 3>& profiles) {
+  double fastest = 0;
+  for (const Profile& profile : profiles)
+    if (profile.total > 0)
+      fastest = std::max(fastest, std::min(profile.terms[0].sigma, profile.terms[1].sigma));
+  return fastest;
+}
+
 }  // namespace
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
     : group_(group),
       spacing_(hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
-      kernel_(resolve_profiles(make_profiles(medium), spacing_)),
+      kernel_(resolved_profiles(medium, spacing_)),
       promise_(promise),
       allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
@@ -55,6 +66,8 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   if (!(spacing_ > 0)) spacing_ = cell_size_;
   if (promise == Promise::kCalibrated)
     allowance_ *= std::clamp(double{root.radius} / (kManyLengths * length), kFewest, 1.0);
+  if (promise == Promise::kCalibrated)
+    own_share_ = 1 / (1 + square(2 * decay(make_profiles(medium)) * length));
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
@@ -103,7 +116,7 @@ void Exitance::make_tables() {
     return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
   };
   const bool certified = promise_ == Promise::kCertified;
-  const double own = 0.5 * allowance_;
+  const double own = 0.5 * allowance_ * own_share_;
   const double weight = (certified ? 1 : kSeriesWeight) / 6;
   const OctreeNode& root = group_.nodes[0];
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 #include "nacre/cache/octree.h"
 
@@ -77,6 +78,92 @@ void relight(Cache& cache, std::span<const double> etas, std::span<const LightSc
         std::make_shared<const std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
             std::move(cache.storage), owned);
   }
+}
+
+namespace {
+
+struct ExtendedGroup {
+  std::array<std::vector<float>, 3> irradiance;
+  std::vector<float> light_irradiance, errors;
+  std::vector<EtaRatios> ratios;
+  std::vector<OctreeNode> nodes;
+};
+
+// The values of all planes, one after the other; nothing where one of them has none.
+template <class T, class Member>
+std::vector<T> join(const std::vector<LightPlane>& lights, std::size_t n, const Member& member) {
+  std::vector<T> joined;
+  for (const LightPlane& light : lights) {
+    const std::span<const T> values = member(light);
+    if (values.size() != n) return {};
+    joined.insert(joined.end(), values.begin(), values.end());
+  }
+  return joined;
+}
+
+std::shared_ptr<const ExtendedGroup> append_group(CacheGroup& group, const CacheGroup& more) {
+  const std::size_t n = group.size();
+  const auto extended = std::make_shared<ExtendedGroup>();
+  for (std::size_t k = 0; k < 3; ++k) {
+    extended->irradiance[k].resize(n);
+    for (std::size_t i = 0; i < n; ++i)
+      extended->irradiance[k][i] = group.planes[7 + k][i] + more.planes[7 + k][i];
+  }
+  group.lights.insert(group.lights.end(), more.lights.begin(), more.lights.end());
+  extended->errors = join<float>(group.lights, n, [](const LightPlane& l) { return l.errors; });
+  extended->ratios = join<EtaRatios>(group.lights, n, [](const LightPlane& l) { return l.ratios; });
+  for (const LightPlane& light : group.lights)
+    for (const auto& channel : light.irradiance)
+      extended->light_irradiance.insert(extended->light_irradiance.end(), channel.begin(), channel.end());
+  for (std::size_t l = 0; l < group.lights.size(); ++l) {
+    LightPlane& light = group.lights[l];
+    for (std::size_t k = 0; k < 3; ++k)
+      light.irradiance[k] = std::span<const float>(extended->light_irradiance).subspan((3 * l + k) * n, n);
+    light.errors = {};
+    light.ratios = {};
+    if (!extended->errors.empty()) light.errors = std::span<const float>(extended->errors).subspan(l * n, n);
+    if (!extended->ratios.empty())
+      light.ratios = std::span<const EtaRatios>(extended->ratios).subspan(l * n, n);
+  }
+  extended->nodes.assign(group.nodes.begin(), group.nodes.end());
+  for (std::size_t k = 0; k < 3; ++k) group.planes[7 + k] = extended->irradiance[k];
+  sum_nodes(group, extended->nodes);
+  group.nodes = extended->nodes;
+  return extended;
+}
+
+bool keeps_lights_apart(const CacheGroup& group) {
+  return !group.lights.empty() &&
+         std::ranges::none_of(group.lights, [](const LightPlane& light) { return light.name.empty(); });
+}
+
+}  // namespace
+
+void append_lights(Cache& cache, const Cache& more, const std::string& place) {
+  if (cache.groups.size() != more.groups.size())
+    fail(ErrorCode::kMismatch, place, "has {} groups, and the scene {}", cache.groups.size(),
+         more.groups.size());
+  for (std::size_t g = 0; g < cache.groups.size(); ++g) {
+    const CacheGroup &own = cache.groups[g], &other = more.groups[g];
+    if (!keeps_lights_apart(own) || !keeps_lights_apart(other))
+      fail(ErrorCode::kMismatch, place,
+           "the cache does not keep its lights apart; bake it again with --per-light");
+    bool same = own.size() == other.size() && own.eta == other.eta;
+    for (std::size_t k = 0; same && k <= static_cast<std::size_t>(Plane::kArea); ++k)
+      same = std::ranges::equal(own.planes[k], other.planes[k]);
+    if (!same)
+      fail(ErrorCode::kMismatch, place,
+           "its samples of {} are not those that this bake has; give the --seed and density that it was "
+           "baked with",
+           own.name);
+  }
+  for (std::size_t g = 0; g < cache.groups.size(); ++g) {
+    const auto owned = append_group(cache.groups[g], more.groups[g]);
+    cache.storage =
+        std::make_shared<const std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
+            std::move(cache.storage), owned);
+  }
+  cache.fingerprint = more.fingerprint;
 }
 
 float irradiance_error(const CacheGroup& group, std::size_t sample) noexcept {

@@ -138,11 +138,6 @@ Profile resolve_profile(const Profile& profile, double spacing) {
   return resolved;
 }
 
-std::array<Profile, 3> resolve_profiles(std::array<Profile, 3> profiles, double spacing) {
-  for (Profile& profile : profiles) profile = resolve_profile(profile, spacing);
-  return profiles;
-}
-
 std::array<Profile, 3> make_profiles(const Medium& medium) {
   std::array<Profile, 3> profiles;
   for (int k = 0; k < 3; ++k) {
@@ -162,6 +157,13 @@ std::array<Profile, 3> make_profiles(const Medium& medium) {
         break;
     }
   }
+  return profiles;
+}
+
+std::array<Profile, 3> resolved_profiles(const Medium& medium, double spacing) {
+  const double finest = kFinestSpacing * double{smallest_mean_free_path(medium)} / double{medium.scale};
+  std::array<Profile, 3> profiles = make_profiles(medium);
+  for (Profile& profile : profiles) profile = resolve_profile(profile, std::max(spacing, finest));
   return profiles;
 }
 

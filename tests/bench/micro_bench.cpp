@@ -38,7 +38,7 @@ std::vector<float> make_distances() {
 }
 
 void eval_kernel(benchmark::State& state, const Medium& medium) {
-  const Kernel kernel(resolve_profiles(make_profiles(medium), 0.01));
+  const Kernel kernel(resolved_profiles(medium, 0.01));
   const std::vector<float> distances = make_distances();
   for (auto _ : state) {
     Float4 sum{};
@@ -59,7 +59,7 @@ class ChosenTarget {
 
 void add_sources(benchmark::State& state, const std::string& target, const Medium& medium) {
   const ChosenTarget chosen(target);
-  const Kernel kernel(resolve_profiles(make_profiles(medium), 0.01));
+  const Kernel kernel(resolved_profiles(medium, 0.01));
   std::vector<SumSource> sources(kSources);
   Rng rng(6);
   for (SumSource& source : sources)

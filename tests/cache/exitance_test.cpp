@@ -30,7 +30,7 @@ std::array<double, 3> reference(const SurfaceSamples& samples, const Medium& med
   double area = 0;
   for (const float a : samples.areas) area += double{a};
   const auto profiles =
-      resolve_profiles(make_profiles(medium), hexagonal_spacing(area, static_cast<double>(samples.size())));
+      resolved_profiles(medium, hexagonal_spacing(area, static_cast<double>(samples.size())));
   std::array<double, 3> sum{};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const double r = (Vec3d(x) - Vec3d(samples.positions[i])).length();

@@ -24,7 +24,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) {
 class EveryKernel : public testing::TestWithParam<Case> {
  protected:
   std::array<Profile, 3> profiles_ =
-      resolve_profiles(make_profiles(make_material(GetParam().preset, GetParam().kind, 1)), 0.2);
+      resolved_profiles(make_material(GetParam().preset, GetParam().kind, 1), 0.2);
   Kernel kernel_{profiles_};
 
   double start() const {

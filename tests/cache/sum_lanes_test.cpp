@@ -43,7 +43,7 @@ std::vector<SumSource> make_sources(std::size_t count) {
 TEST_P(EveryTarget, SumsAListAsAPlainLoopDoes) {
   for (const ProfileKind kind :
        {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized}) {
-    const Kernel kernel(resolve_profiles(make_profiles(make_material("Marble", kind, 3)), 0.1));
+    const Kernel kernel(resolved_profiles(make_material("Marble", kind, 3), 0.1));
     for (const std::size_t count : {1, 3, 4, 7, 8, 15, 16, 17, 63, 64, 65, 1023, 1024, 1025, 5000}) {
       const std::vector<SumSource> sources = make_sources(count);
       SourceList list;

@@ -110,6 +110,32 @@ TEST_F(Relit, ArgumentsThatAreNoneAreRefused) {
   expect_refusal("render s.xml -o x.exr --quiet --aov irradiance --method montecarlo", 2, "--aov irradiance");
 }
 
+TEST_F(Relit, LightsAreAddedToACache) {
+  std::string scene = kScene;
+  const std::size_t at = scene.find("</scene>");
+  folder_.write("more.xml",
+                scene.substr(0, at) +
+                    "<emitter type=\"spot\" id=\"late\"><transform name=\"toWorld\"><lookat origin=\"-20, "
+                    "-30, 10\" target=\"0, 0, 0\" up=\"0, 0, 1\"/></transform><rgb name=\"intensity\" "
+                    "value=\"900, 900, 900\"/></emitter></scene>");
+  run("bake s.xml -o c.nacre --quiet --per-light");
+  expect_refusal("render more.xml --cache c.nacre -o a.exr --quiet", 1, "light late");
+  run("bake more.xml -o c.nacre --quiet --add-lights");
+  run("render more.xml --cache c.nacre -o a.exr --quiet");
+  run("render more.xml -o b.exr --quiet");
+  run("diff a.exr b.exr --fail-above 1e-5");
+  expect_refusal("bake more.xml -o c.nacre --quiet --add-lights", 1, "has all lights");
+  expect_refusal("bake more.xml -o none.nacre --quiet --add-lights", 1, "none.nacre");
+  run("bake s.xml -o all.nacre --quiet");
+  expect_refusal("bake more.xml -o all.nacre --quiet --add-lights", 1, "--per-light");
+  folder_.write(
+      "lamp.xml",
+      scene.substr(0, at) + "<shape type=\"rectangle\" id=\"lamp\"><emitter type=\"area\"/></shape></scene>");
+  run("bake s.xml -o d.nacre --quiet --per-light");
+  expect_refusal("bake lamp.xml -o d.nacre --quiet --add-lights", 1, "shape lamp");
+  run("info d.nacre");
+}
+
 TEST_F(Relit, ErrorsOfTheIrradianceAreShown) {
   run("bake s.xml -o c.nacre --quiet --irradiance-samples 8");
   run("bake s.xml -o d.nacre --quiet --irradiance-samples 8 --irradiance-error 0.005");

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "nacre/base/progress.h"
@@ -11,6 +12,8 @@
 #include "nacre/transport/path.h"
 
 namespace nacre {
+
+class Journal;
 
 struct BakeParams {
   std::optional<double> points;      // total over all groups
@@ -24,6 +27,11 @@ struct BakeParams {
   bool per_light = false;       // whether lights are kept apart (light_plane_name)
   bool fixed_eta = false;       // whether the cache is for the media's own indices of refraction alone
   std::uint64_t seed = 0;
+  // Where to keep what is computed, so that the same bake goes on there after it was interrupted, and after
+  // how many seconds; empty: nowhere. The file stays: it is of no more use when the cache has been saved.
+  std::string journal = {};
+  double journal_after = 5;
+  std::vector<std::string> only_lights = {};  // with per_light: the planes to compute; empty: all
 };
 
 inline constexpr double kDefaultSpacing = 0.65;  // mean free paths
@@ -78,6 +86,8 @@ struct IrradianceParams {
   double error = 0;        // as BakeParams::irradiance_error
   bool every_eta = false;  // whether SampleLight::ratios are wanted
   std::uint64_t seed = 0;
+  Journal* journal = nullptr;  // where results are looked for and kept
+  std::uint64_t pass = 0;      // of the bake: records of this call have the numbers 2 pass and 2 pass + 1
 };
 
 /// Irradiance E_t transmitted at points into a medium of relative index eta, with its standard error: the

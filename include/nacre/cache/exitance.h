@@ -113,6 +113,7 @@ class Exitance {
   Kernel kernel_;
   Promise promise_;
   double allowance_;
+  double own_share_ = 1;        // of it, what a node's own contribution allows
   float moment_slack_ = 1e-5f;  // what rounding and tables may take from second moments
   Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1, cells_per_unit_ = 1;

@@ -26,10 +26,10 @@ namespace nacre {
 class ExitanceField {
  public:
   /// Distance of nodes in smallest mean free paths for a tolerance of the sum, below which interpolation
-  /// stays: M_o has no detail below about one. Its error is 0.1 to 0.25 % at the distance for 0.4 % and more,
+  /// stays: M_o has no detail below about one. Its error is 0.1 to 0.25 % at the distance for 0.6 % and more,
   /// and falls at least with the square of that.
   static double node_distance(double tolerance) noexcept {
-    return 1.9 * std::min(1.0, std::sqrt(tolerance / 0.004));
+    return 1.9 * std::min(1.0, std::sqrt(tolerance / 0.006));
   }
 
   /// `meshes` by the index that hits have (nullptr: of another medium); `distance` of nodes in scene units.

@@ -24,6 +24,11 @@ bool serves_eta(const CacheGroup& group, double eta) noexcept;
 /// was baked are those of the file.
 void relight(Cache& cache, std::span<const double> etas, std::span<const LightScale> scales);
 
+/// Adds the planes of light of `more`, a bake of the same samples under other lights, to a cache, whose
+/// fingerprint becomes that of `more`. Throws Error(kMismatch, place) where samples are not the same, or
+/// either does not keep its lights apart.
+void append_lights(Cache& cache, const Cache& more, const std::string& place);
+
 /// Standard error of the mean channel of a sample's irradiance, of all lights together; 0 where none is
 /// known.
 float irradiance_error(const CacheGroup& group, std::size_t sample) noexcept;

@@ -43,9 +43,12 @@ Profile make_normalized_diffusion(double sigma_s_prime, double sigma_a, double e
 /// kept, what is further away than a few spacings changes in second order, and the sum over samples is smooth
 /// however far they are apart. Other profiles are left alone.
 Profile resolve_profile(const Profile& profile, double spacing);
-std::array<Profile, 3> resolve_profiles(std::array<Profile, 3> profiles, double spacing);
 
 /// The medium's own profile, r, g, b, in scene units (coefficients times scale).
 std::array<Profile, 3> make_profiles(const Medium& medium);
+/// The same as samples carry it (resolve_profile): not finer than kFinestSpacing smallest mean free paths,
+/// which is what exitance is interpolated by.
+std::array<Profile, 3> resolved_profiles(const Medium& medium, double spacing);
+inline constexpr double kFinestSpacing = 0.5;
 
 }  // namespace nacre
