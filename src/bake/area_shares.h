@@ -9,10 +9,10 @@
 
 namespace nacre {
 
-/// Areas of the points' Voronoi cells on the surface, in scene units^2: each cell is taken in the tangent
-/// plane of its point, from neighbours on the same sheet at their distance in space, and ends at borders and
-/// sharp creases. The cells of each connected piece of the surface are scaled to add up to its area, and all
-/// of them to the whole.
+/// The points' shares of the surface, in scene units^2: their Voronoi cells, and of a smaller neighbour's
+/// cell a little more for a point whose own is larger, so that sums over samples are more even than those
+/// over the cells alone. The shares of each connected piece of the surface are scaled to add up to its area,
+/// and all of them to the whole.
 std::vector<float> compute_area_shares(const GroupSurface& surface, const std::vector<PlacedPoint>& points,
                                        Progress& progress);
 

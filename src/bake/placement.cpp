@@ -1,237 +1,267 @@
 // Dart throwing in blocks.
 #include "bake/placement.h"
 
-#include <array>
-#include <tuple>
-#include <unordered_map>
-
+#include "bake/space_blocks.h"
 #include "nacre/base/error.h"
-#include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "nacre/cache/cache.h"
 
 namespace nacre {
 namespace {
 
-// Smallest distance over hexagonal spacing. With this many candidates per point about `target` darts stick
-// (measured); more candidates would allow a larger ratio, up to 0.777 at saturation.
+// Smallest distance over the hexagonal spacing of the target. With this many candidates per point about as
+// many darts stick as are asked for (measured); more candidates would allow a larger ratio, up to 0.777 at
+// saturation.
 constexpr double kRelativeRadius = 0.715;
-constexpr int kRounds = 14;
+constexpr double kCandidates = 13;
+// At most so many per point at once, for the memory that they take.
+constexpr double kCandidatesAtOnce = 4;
+constexpr double kFewestCandidates = 256;
 
-constexpr int kBlockCells = 8;               // cells of one radius along a block's side
-constexpr int kGridCells = kBlockCells + 2;  // with a halo of one cell
-constexpr int kCoordinateBits = 16;
+constexpr int kBlockCells = 8;  // cells along a block's side, each two radii wide
+constexpr float kBlockRadii = 2.0f * kBlockCells;
+constexpr double kPointsPerBlock = 96;  // about, where a surface passes through
 
-struct Candidate {
-  std::uint64_t key;  // block, then a random rank inside it
+struct Point {
   Vec3 position;
   std::uint32_t triangle;
 };
 
-struct Block {
-  std::array<int, 3> coordinates;
-  std::vector<PlacedPoint> points;
-};
-
-std::uint64_t pack(int x, int y, int z) {
-  return static_cast<std::uint64_t>(x) << (2 * kCoordinateBits) |
-         static_cast<std::uint64_t>(y) << kCoordinateBits | static_cast<std::uint64_t>(z);
-}
-
-// The points of one block and its surroundings in a dense grid of cells, for constant-time look-up.
-class LocalGrid {
+// Points in the order of strata of area: point i is a function of seed and round alone, cheap to make again.
+class CandidateStream {
  public:
-  LocalGrid(const Vec3& corner, float radius)
-      : corner_(corner), inverse_(1 / radius), radius2_(radius * radius) {
-    heads_.fill(-1);
-  }
-  void add(const PlacedPoint& point) {
-    std::array<int, 3> cell;
-    if (!locate(point.position, cell)) return;
-    int& head = heads_[index(cell[0], cell[1], cell[2])];
-    next_.push_back(head);
-    points_.push_back({point.position, point.normal});
-    head = static_cast<int>(points_.size()) - 1;
-  }
-  bool conflicts(const Vec3& position, const Vec3& normal) const {
-    std::array<int, 3> cell;
-    if (!locate(position, cell)) return true;
-    for (int z = cell[2] - 1; z <= cell[2] + 1; ++z)
-      for (int y = cell[1] - 1; y <= cell[1] + 1; ++y)
-        for (int x = cell[0] - 1; x <= cell[0] + 1; ++x)
-          for (int i = heads_[index(x, y, z)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) {
-            const auto& [other, other_normal] = points_[static_cast<std::size_t>(i)];
-            if ((other - position).length2() < radius2_ && dot(other_normal, normal) > kSameSheetCosine)
-              return true;
-          }
-    return false;
+  CandidateStream(const GroupSurface& surface, std::uint64_t seed, std::uint64_t round, std::size_t count)
+      : surface_(surface),
+        cumulative_(surface.areas.cumulative()),
+        seed_(seed),
+        round_(round),
+        stratum_(surface.areas.total() / static_cast<double>(count)) {}
+
+  /// Ascending i, from one call to the next.
+  Point make(std::size_t i) {
+    Rng rng(hash_words(seed_, round_, i));
+    find_triangle((static_cast<double>(i) + rng.next_double()) * stratum_);
+    const std::uint64_t bits = rng.next_bits();
+    const Vec2 b = sample_uniform_triangle(
+        {to_unit_float(static_cast<std::uint32_t>(bits >> 32)), to_unit_float(static_cast<std::uint32_t>(bits))});
+    const Triangle& t = surface_.triangles[triangle_];
+    const Vec3& p0 = surface_.positions[t[0]];
+    return {p0 + (surface_.positions[t[1]] - p0) * b.x + (surface_.positions[t[2]] - p0) * b.y,
+            static_cast<std::uint32_t>(triangle_)};
   }
 
  private:
-  static std::size_t index(int x, int y, int z) {
-    return static_cast<std::size_t>(((z + 1) * (kGridCells + 2) + y + 1) * (kGridCells + 2) + x + 1);
-  }
-  // Cells 0 to kGridCells - 1 along each axis, the halo included; one more layer around stays empty.
-  bool locate(const Vec3& p, std::array<int, 3>& cell) const {
-    for (int axis = 0; axis < 3; ++axis) {
-      const float c = std::floor((p[axis] - corner_[axis]) * inverse_) + 1;
-      if (!(c >= 0 && c < static_cast<float>(kGridCells))) return false;
-      cell[static_cast<std::size_t>(axis)] = static_cast<int>(c);
+  // The first triangle whose cumulative area is above x, never one without area; in steps that double, since
+  // it is mostly near the last.
+  void find_triangle(double x) {
+    x = std::min(x, std::nextafter(cumulative_.back(), 0.0));
+    std::size_t low = triangle_, step = 1;
+    while (low + step < cumulative_.size() && cumulative_[low + step - 1] <= x) {
+      low += step;
+      step *= 2;
     }
+    const auto begin = cumulative_.begin() + static_cast<std::ptrdiff_t>(low);
+    const auto end = cumulative_.begin() + static_cast<std::ptrdiff_t>(std::min(low + step, cumulative_.size()));
+    triangle_ = static_cast<std::size_t>(std::upper_bound(begin, end, x) - cumulative_.begin());
+  }
+
+  const GroupSurface& surface_;
+  std::span<const double> cumulative_;
+  std::uint64_t seed_, round_;
+  double stratum_;
+  std::size_t triangle_ = 0;
+};
+
+// The points of one block and its surroundings in a dense grid. Cells are two radii wide, so that all that a
+// dart can be too near to is in the eight cells around the corner nearest to it.
+class LocalGrid {
+ public:
+  LocalGrid(const GroupSurface& surface, float radius)
+      : surface_(surface), inverse_(0.5f / radius), radius2_(radius * radius) {}
+
+  void move_to(const Vec3& corner) {
+    corner_ = corner;
+    heads_.fill(-1);
+    entries_.clear();
+  }
+  void add(const Point& point, const Vec3& normal) {
+    const Vec3 at = (point.position - corner_) * inverse_;
+    insert(point, normal, index(cell_of(at.x), cell_of(at.y), cell_of(at.z)));
+  }
+  /// Adds a point of a neighbour unless it is too far away to matter.
+  void add_from_outside(const Point& point) {
+    const Vec3 at = (point.position - corner_) * inverse_;
+    constexpr float kMargin = 0.51f;  // a radius, and what rounding may add
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(at[axis] > -kMargin && at[axis] < static_cast<float>(kBlockCells) + kMargin)) return;
+    const auto cell = [](float x) { return static_cast<int>(x + 1) - 1; };
+    insert(point, surface_.normal(point.triangle), index(cell(at.x), cell(at.y), cell(at.z)));
+  }
+  bool add_if_free(const Point& point) {
+    const Vec3 at = (point.position - corner_) * inverse_;
+    const int x = cell_of(at.x), y = cell_of(at.y), z = cell_of(at.z);
+    const auto side = [](float position, int cell) { return position - static_cast<float>(cell) < 0.5f ? -1 : 1; };
+    const int own = index(x, y, z);
+    const int dx = side(at.x, x) * index_step(0), dy = side(at.y, y) * index_step(1),
+              dz = side(at.z, z) * index_step(2);
+    Vec3 normal(0);
+    bool have_normal = false;
+    for (const int cell : {own, own + dx, own + dy, own + dz, own + dx + dy, own + dx + dz, own + dy + dz,
+                           own + dx + dy + dz})
+      for (int i = heads_[static_cast<std::size_t>(cell)]; i >= 0;) {
+        const Entry& entry = entries_[static_cast<std::size_t>(i)];
+        if ((entry.position - point.position).length2() < radius2_) {
+          if (entry.triangle == point.triangle) return false;
+          if (!have_normal) normal = surface_.normal(point.triangle), have_normal = true;
+          if (dot(entry.normal, normal) > kSameSheetCosine) return false;
+        }
+        i = entry.next;
+      }
+    insert(point, have_normal ? normal : surface_.normal(point.triangle), own);
     return true;
   }
 
+ private:
+  static constexpr int kSide = kBlockCells + 2;
   struct Entry {
     Vec3 position, normal;
+    std::uint32_t triangle;
+    int next;
   };
-  Vec3 corner_;
+
+  static constexpr int index_step(int axis) { return axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide; }
+  static int index(int x, int y, int z) {
+    return (x + 1) * index_step(0) + (y + 1) * index_step(1) + (z + 1) * index_step(2);
+  }
+  // Rounding may leave a point of the block just outside it.
+  static int cell_of(float x) { return std::clamp(static_cast<int>(x), 0, kBlockCells - 1); }
+  void insert(const Point& point, const Vec3& normal, int cell) {
+    int& head = heads_[static_cast<std::size_t>(cell)];
+    entries_.push_back({point.position, normal, point.triangle, head});
+    head = static_cast<int>(entries_.size()) - 1;
+  }
+
+  const GroupSurface& surface_;
   float inverse_, radius2_;
-  std::array<int, (kGridCells + 2) * (kGridCells + 2) * (kGridCells + 2)> heads_;
-  std::vector<int> next_;
-  std::vector<Entry> points_;
+  Vec3 corner_;
+  std::array<int, kSide * kSide * kSide> heads_;
+  std::vector<Entry> entries_;
 };
+
+Box3 bounds_of(const GroupSurface& surface) {
+  Box3 box;
+  for (const Vec3& p : surface.positions) box.extendBy(p);
+  return box;
+}
 
 class DartThrower {
  public:
-  DartThrower(const GroupSurface& surface, double target, std::uint64_t seed)
-      : surface_(surface), seed_(seed) {
-    radius_ = static_cast<float>(kRelativeRadius * hexagonal_spacing(surface.areas.total(), target));
-    for (const Vec3& p : surface.positions) box_.extendBy(p);
-    // Block coordinates have to fit their bits; where space is that large blocks hold more than a block's
-    // cells, which is then the caller's limit on the number of points.
-    block_size_ = radius_ * static_cast<float>(kBlockCells);
-  }
+  DartThrower(const GroupSurface& surface, const Box3& box, float radius, double target, std::uint64_t seed)
+      : surface_(surface),
+        seed_(seed),
+        radius_(radius),
+        blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target / kPointsPerBlock)),
+        points_(blocks_.bucket_count()) {}
 
-  static bool fits(const GroupSurface& surface, double target) {
-    Box3 box;
-    for (const Vec3& p : surface.positions) box.extendBy(p);
-    const double block = kRelativeRadius * hexagonal_spacing(surface.areas.total(), target) * kBlockCells;
-    const Vec3 size = box.size();
-    return std::max({size.x, size.y, size.z}) / block < (1 << kCoordinateBits) - 2;
-  }
-
-  void throw_round(int round, std::size_t candidates) {
-    candidates_.resize(candidates);
-    make_candidates(round);
-    parallel_sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
-      return a.key != b.key ? a.key < b.key
-                            : std::tie(a.triangle, a.position.x, a.position.y, a.position.z) <
-                                  std::tie(b.triangle, b.position.x, b.position.y, b.position.z);
-    });
-    find_runs();
-    for (unsigned phase = 0; phase < 8; ++phase) throw_phase(phase);
+  void throw_round(std::uint64_t round, std::size_t count) {
+    const Buckets candidates = sort_into_buckets(
+        count, blocks_.bucket_count(), [&](std::size_t begin, std::size_t end, const auto& emit) {
+          CandidateStream stream(surface_, seed_, round, count);
+          for (std::size_t i = begin; i < end; ++i) emit(i, blocks_.bucket(blocks_.at(stream.make(i).position)));
+        });
+    for (std::uint32_t phase = 0; phase < SpaceBlocks::kPhases; ++phase) {
+      const std::uint32_t first = phase * blocks_.buckets_per_phase();
+      parallel_for(blocks_.buckets_per_phase(), 8, [&](std::size_t begin, std::size_t end) {
+        Scratch scratch{LocalGrid(surface_, radius_), {}, {}};
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::uint32_t bucket = first + static_cast<std::uint32_t>(i);
+          throw_into_bucket(bucket, candidates.of(bucket), round, count, scratch);
+        }
+      });
+    }
   }
 
   std::size_t count() const {
     std::size_t sum = 0;
-    for (const Block& block : blocks_) sum += block.points.size();
+    for (const auto& bucket : points_) sum += bucket.size();
     return sum;
   }
 
   std::vector<PlacedPoint> take_points() {
-    // In the order of the blocks' coordinates, which does not depend on when a block was first met.
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
-    for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
-      const auto& c = blocks_[b].coordinates;
-      order.emplace_back(pack(c[0], c[1], c[2]), b);
+    std::vector<std::size_t> begins(points_.size());
+    std::size_t sum = 0;
+    for (std::size_t b = 0; b < points_.size(); ++b) {
+      begins[b] = sum;
+      sum += points_[b].size();
     }
-    std::sort(order.begin(), order.end());
-    std::vector<PlacedPoint> points;
-    for (const auto& [key, b] : order) {
-      points.insert(points.end(), blocks_[b].points.begin(), blocks_[b].points.end());
-      std::vector<PlacedPoint>().swap(blocks_[b].points);
-    }
-    return points;
+    std::vector<PlacedPoint> placed(sum);
+    parallel_for(points_.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t b = begin; b < end; ++b) {
+        std::size_t at = begins[b];
+        for (const Point& point : points_[b])
+          placed[at++] = {point.position, point.triangle, surface_.normal(point.triangle)};
+        std::vector<Point>().swap(points_[b]);
+      }
+    });
+    return placed;
   }
 
  private:
-  struct Run {
-    std::size_t begin, end;
-    std::uint32_t block;
+  struct Dart {
+    std::uint64_t block;
+    Point point;
+  };
+  struct Scratch {
+    LocalGrid grid;
+    std::vector<Dart> darts;
+    std::vector<Point> stuck;
   };
 
-  // One candidate per stratum of area, keyed by its number.
-  void make_candidates(int round) {
-    const std::size_t count = candidates_.size();
-    parallel_for(count, 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        Rng rng(hash_words(seed_, static_cast<std::uint64_t>(round), i));
-        double u = (static_cast<double>(i) + rng.next_double()) / static_cast<double>(count);
-        const std::size_t triangle = surface_.areas.sample(u);
-        const Vec2 b = sample_uniform_triangle(rng.next_2d());
-        const Triangle& t = surface_.triangles[triangle];
-        const Vec3& p0 = surface_.positions[t[0]];
-        const Vec3 p = p0 + (surface_.positions[t[1]] - p0) * b.x + (surface_.positions[t[2]] - p0) * b.y;
-        std::array<int, 3> c;
-        for (int axis = 0; axis < 3; ++axis)
-          c[static_cast<std::size_t>(axis)] = static_cast<int>((p[axis] - box_.min[axis]) / block_size_) + 1;
-        candidates_[i] = {pack(c[0], c[1], c[2]) << 16 | rng.next_bits() >> 48, p,
-                          static_cast<std::uint32_t>(triangle)};
-      }
-    });
-  }
-
-  // Consecutive candidates of one block; blocks that were not met before are added.
-  void find_runs() {
-    runs_.clear();
-    for (std::size_t begin = 0; begin < candidates_.size();) {
-      const std::uint64_t key = candidates_[begin].key >> 16;
+  void throw_into_bucket(std::uint32_t bucket, std::span<const std::uint32_t> candidates, std::uint64_t round,
+                         std::size_t count, Scratch& scratch) {
+    if (candidates.empty()) return;
+    std::vector<Dart>& darts = scratch.darts;
+    darts.clear();
+    CandidateStream stream(surface_, seed_, round, count);
+    bool one_block = true;
+    for (const std::uint32_t i : candidates) {
+      const Point point = stream.make(i);
+      darts.push_back({SpaceBlocks::key(blocks_.at(point.position)), point});
+      one_block = one_block && darts.back().block == darts.front().block;
+    }
+    // Candidates come triangle by triangle, darts have to fly in no order.
+    Rng rng(hash_words(seed_, round, bucket, 1));
+    for (std::size_t i = darts.size(); i > 1; --i)
+      std::swap(darts[i - 1], darts[static_cast<std::size_t>((rng.next_bits() >> 32) * i >> 32)]);
+    if (!one_block)
+      std::stable_sort(darts.begin(), darts.end(), [](const Dart& a, const Dart& b) { return a.block < b.block; });
+    for (std::size_t begin = 0; begin < darts.size();) {
       std::size_t end = begin + 1;
-      while (end < candidates_.size() && candidates_[end].key >> 16 == key) ++end;
-      const auto [at, added] = numbers_.try_emplace(key, static_cast<std::uint32_t>(blocks_.size()));
-      if (added) {
-        constexpr std::uint64_t kMask = (1u << kCoordinateBits) - 1;
-        blocks_.push_back({{static_cast<int>(key >> (2 * kCoordinateBits)),
-                            static_cast<int>(key >> kCoordinateBits & kMask), static_cast<int>(key & kMask)},
-                           {}});
-      }
-      runs_.push_back({begin, end, at->second});
+      while (end < darts.size() && darts[end].block == darts[begin].block) ++end;
+      throw_into_block(bucket, std::span(darts).subspan(begin, end - begin), scratch);
       begin = end;
     }
   }
 
-  // Blocks of one phase are a whole block apart in each direction, so that what one reads no other writes.
-  void throw_phase(unsigned phase) {
-    std::vector<const Run*> runs;
-    for (const Run& run : runs_) {
-      const auto& c = blocks_[run.block].coordinates;
-      const auto parity = static_cast<unsigned>((c[0] & 1) | (c[1] & 1) << 1 | (c[2] & 1) << 2);
-      if (parity == phase) runs.push_back(&run);
-    }
-    parallel_for(runs.size(), 4, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) throw_into_block(*runs[i]);
+  void throw_into_block(std::uint32_t bucket, std::span<const Dart> darts, Scratch& scratch) {
+    const BlockAt block = SpaceBlocks::from_key(darts.front().block);
+    scratch.grid.move_to(blocks_.corner(block));
+    SpaceBlocks::for_each_around(block, [&](const BlockAt& near) {
+      for (const Point& point : points_[blocks_.bucket(near)]) scratch.grid.add_from_outside(point);
     });
-  }
-
-  void throw_into_block(const Run& run) {
-    Block& block = blocks_[run.block];
-    const auto& c = block.coordinates;
-    const Vec3 corner = box_.min + Vec3(static_cast<float>(c[0] - 1), static_cast<float>(c[1] - 1),
-                                        static_cast<float>(c[2] - 1)) *
-                                       block_size_;
-    LocalGrid grid(corner, radius_);
-    for (int z = c[2] - 1; z <= c[2] + 1; ++z)
-      for (int y = c[1] - 1; y <= c[1] + 1; ++y)
-        for (int x = c[0] - 1; x <= c[0] + 1; ++x)
-          if (const auto at = numbers_.find(pack(x, y, z)); at != numbers_.end())
-            for (const PlacedPoint& point : blocks_[at->second].points) grid.add(point);
-    for (std::size_t i = run.begin; i < run.end; ++i) {
-      const Candidate& candidate = candidates_[i];
-      const PlacedPoint point{candidate.position, candidate.triangle, surface_.normal(candidate.triangle)};
-      if (grid.conflicts(point.position, point.normal)) continue;
-      grid.add(point);
-      block.points.push_back(point);
-    }
+    scratch.stuck.clear();
+    for (const Dart& dart : darts)
+      if (scratch.grid.add_if_free(dart.point)) scratch.stuck.push_back(dart.point);
+    std::vector<Point>& points = points_[bucket];
+    points.reserve(points.size() + scratch.stuck.size());  // and not twice that
+    points.insert(points.end(), scratch.stuck.begin(), scratch.stuck.end());
   }
 
   const GroupSurface& surface_;
   std::uint64_t seed_;
-  float radius_, block_size_;
-  Box3 box_;
-  std::vector<Candidate> candidates_;
-  std::vector<Run> runs_;
-  std::vector<Block> blocks_;
-  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // block coordinates to index
+  float radius_;
+  SpaceBlocks blocks_;
+  std::vector<std::vector<Point>> points_;  // by bucket
 };
 
 }  // namespace
@@ -239,22 +269,28 @@ class DartThrower {
 std::vector<PlacedPoint> place_points(const GroupSurface& surface, double target, std::uint64_t seed,
                                       Progress& progress) {
   if (!(surface.areas.total() > 0) || !(target > 0)) return {};
-  if (!DartThrower::fits(surface, target))
+  const Box3 box = bounds_of(surface);
+  const Vec3 size = box.size();
+  const double radius = kRelativeRadius * hexagonal_spacing(surface.areas.total(), target);
+  if (!(std::max({size.x, size.y, size.z}) / (radius * static_cast<double>(kBlockRadii)) <
+        SpaceBlocks::kMostBlocks - 1))
     fail(ErrorCode::kLimit, "",
          "the samples are too close together for an object of this size; check `scale` or use fewer points");
-  DartThrower thrower(surface, target, seed);
-  progress.begin("placing samples", "rounds", kRounds);
+  DartThrower thrower(surface, box, static_cast<float>(radius), target, seed);
+  double left = std::ceil(kCandidates * std::max(target, kFewestCandidates / kCandidates));
+  progress.begin("placing samples", "candidates", static_cast<std::uint64_t>(left));
   // On dust and hair, which have room for any number of points, nearly every dart sticks: no round throws
   // more than are missing at the rate at which those of the round before stuck.
-  const double most = std::max(target, 256.0);
-  double rate = 1;
-  for (int round = 0; round < kRounds; ++round) {
-    const auto before = static_cast<double>(thrower.count());
-    if (before >= target) break;
-    const double candidates = std::ceil(std::min(most, (target - before) / rate));
+  double rate = 1, count = 0;
+  for (std::uint64_t round = 0; count < target && left >= 1; ++round) {
+    const double candidates = std::ceil(
+        std::min({(target - count) / rate, std::max(kCandidatesAtOnce * target, kFewestCandidates), left}));
     thrower.throw_round(round, static_cast<std::size_t>(candidates));
-    rate = (static_cast<double>(thrower.count()) - before) / candidates;
-    progress.advance(1);
+    const auto now = static_cast<double>(thrower.count());
+    rate = (now - count) / candidates;
+    count = now;
+    left -= candidates;
+    progress.advance(static_cast<std::uint64_t>(candidates));
   }
   progress.end();
   return thrower.take_points();

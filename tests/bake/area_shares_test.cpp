@@ -1,5 +1,5 @@
 // label: analytic
-// Shares of the surface against Voronoi cells counted point by point.
+// Voronoi cells against cells counted point by point, and shares of the surface.
 #include "bake/area_shares.h"
 
 #include <gtest/gtest.h>
@@ -50,7 +50,7 @@ TEST(AreaShares, PiecesWithoutASampleLeaveTheirsToTheOthers) {
   EXPECT_NEAR(sum(share(surface, points)), surface.areas.total(), 1e-3 * surface.areas.total());
 }
 
-// How far shares are from the areas of all that is nearer to a point than to any other, in the mean and at
+// How far areas of cells are from the areas of all that is nearer to a point than to any other, in the mean and at
 // most, relative to the mean share. `probes` are points uniform by area; `may_own` says whether a sample is
 // on the probe's sheet.
 struct Deviation {
@@ -99,7 +99,7 @@ std::vector<PlacedPoint> raster(const Vec3& normal) {
 void check_plane(const Mesh& mesh, const Frame& turned = make_frame({0, 0, 1}), const Vec3& moved = Vec3(0)) {
   const GroupSurface surface = make_surface({mesh});
   auto points = place(surface, 300);
-  const auto shares = share(surface, points);
+  const auto shares = cell_areas(surface, points);
   for (PlacedPoint& point : points) {
     point.position = turned.to_local(point.position - moved);
     point.normal = turned.to_local(point.normal);
@@ -126,7 +126,7 @@ TEST(AreaShares, EndAtABorderOfManyShortEdges) { check_plane(make_grid_plane(300
 TEST(AreaShares, EndAtCreases) {
   const GroupSurface surface = make_surface({make_cube()});
   const auto points = place(surface, 600);
-  const auto shares = share(surface, points);
+  const auto shares = cell_areas(surface, points);
   // Probes face by face; only samples of that face can own one.
   std::vector<PlacedPoint> probes;
   Rng rng(5);
@@ -155,7 +155,7 @@ TEST(AreaShares, EndAtCreases) {
 TEST(AreaShares, AreVoronoiCellsOnASphere) {
   const GroupSurface surface = make_surface({make_sphere()});
   const auto points = place(surface, 800);
-  const auto shares = share(surface, points);
+  const auto shares = cell_areas(surface, points);
   std::vector<PlacedPoint> probes;
   for (std::uint32_t i = 0; i < 400000; ++i) {
     const Vec3 direction = sample_uniform_sphere(sobol_2d(i, 9));
@@ -172,7 +172,7 @@ TEST(AreaShares, OpposedSheetsDoNotShare) {
   const GroupSurface surface =
       make_surface({make_rectangle(), flipped(placed(make_rectangle(), 1, {0, 0, -gap}))});
   const auto points = place(surface, target);
-  const auto shares = share(surface, points);
+  const auto shares = cell_areas(surface, points);
   for (const float side : {1.0f, -1.0f}) {
     std::vector<PlacedPoint> of_side;
     std::vector<float> their_shares;

@@ -29,7 +29,8 @@ enum class Areas { kShares, kEqual };
 double measure_blotch(const GroupSurface& surface, double spacing, const std::vector<Vec3>& probes,
                       Areas areas = Areas::kShares, ProfileKind profile = ProfileKind::kDipole) {
   const double area = surface.areas.total();
-  const auto points = place(surface, 2 / std::sqrt(3.0) * area / square(spacing * mean_free_path()));
+  static const int seed = getenv("SEED") ? atoi(getenv("SEED")) : 1;
+  const auto points = place(surface, 2 / std::sqrt(3.0) * area / square(spacing * mean_free_path()), static_cast<std::uint64_t>(seed));
   SurfaceSamples samples;
   for (const PlacedPoint& point : points) {
     samples.positions.push_back(point.position);
@@ -53,6 +54,7 @@ double measure_blotch(const GroupSurface& surface, double spacing, const std::ve
     sum2 += value * value;
   }
   const double count = static_cast<double>(probes.size()), mean = sum / count;
+  printf("BLOTCH spacing %g n %zu per l2 %g blotch %.5f\n", spacing, points.size(), double(points.size())/area*square(mean_free_path()), std::sqrt(sum2 / count - mean * mean) / mean);
   EXPECT_GT(mean, 0.5);  // marble's blue total is 0.75
   return std::sqrt(sum2 / count - mean * mean) / mean;
 }

@@ -10,6 +10,7 @@
 #include "bake/area_shares.h"
 #include "bake/group_surface.h"
 #include "bake/placement.h"
+#include "bake/voronoi_cells.h"
 #include "nacre/base/random.h"
 #include "nacre/cache/cache.h"
 #include "transport/scene_parts.h"
@@ -86,6 +87,15 @@ inline std::vector<PlacedPoint> place(const GroupSurface& surface, double target
 inline std::vector<float> share(const GroupSurface& surface, const std::vector<PlacedPoint>& points) {
   Progress progress;
   return compute_area_shares(surface, points, progress);
+}
+
+/// The points' Voronoi cells, before any exchange between them.
+inline std::vector<float> cell_areas(const GroupSurface& surface, const std::vector<PlacedPoint>& points) {
+  Progress progress;
+  const auto spacing =
+      static_cast<float>(hexagonal_spacing(surface.areas.total(), static_cast<double>(points.size())));
+  return compute_cell_areas(surface, points, PointBlocks(points, kCellReach * spacing), spacing, progress)
+      .areas;
 }
 
 /// Smallest distance between two points whose normals agree, over the hexagonal spacing of as many points.
