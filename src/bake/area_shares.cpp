@@ -66,8 +66,8 @@ std::vector<float> compute_area_shares(const GroupSurface& surface, const std::v
   const auto spacing =
       static_cast<float>(hexagonal_spacing(surface.areas.total(), static_cast<double>(points.size())));
   const PointBlocks blocks(points, kCellReach * spacing);
-  std::vector<float> shares = exchange_areas(
-      blocks, points, compute_cell_areas(surface, points, blocks, spacing, progress), spacing);
+  std::vector<float> shares =
+      exchange_areas(blocks, points, compute_cell_areas(surface, points, blocks, spacing, progress), spacing);
   scale_shares(surface, points, shares);
   return shares;
 }

@@ -1,6 +1,9 @@
 // Dart throwing in blocks.
 #include "bake/placement.h"
 
+#include <limits>
+#include <optional>
+
 #include "bake/space_blocks.h"
 #include "nacre/base/error.h"
 #include "nacre/base/random.h"
@@ -30,23 +33,25 @@ struct Point {
 // Points in the order of strata of area: point i is a function of seed and round alone, cheap to make again.
 class CandidateStream {
  public:
-  CandidateStream(const GroupSurface& surface, std::uint64_t seed, std::uint64_t round, std::size_t count)
+  CandidateStream(const GroupSurface& surface, std::uint64_t key, std::size_t count)
       : surface_(surface),
         cumulative_(surface.areas.cumulative()),
-        seed_(seed),
-        round_(round),
-        stratum_(surface.areas.total() / static_cast<double>(count)) {}
+        key_(key),
+        stratum_(surface.areas.total() / static_cast<double>(count)),
+        last_(std::nextafter(surface.areas.total(), 0.0)) {}
 
   /// Ascending i, from one call to the next.
   Point make(std::size_t i) {
-    Rng rng(hash_words(seed_, round_, i));
-    find_triangle((static_cast<double>(i) + rng.next_double()) * stratum_);
+    Rng rng(key_ + 2 * i * Rng::kStep);  // the i-th pair of one sequence
+    find_triangle(std::min((static_cast<double>(i) + rng.next_double()) * stratum_, last_));
     const std::uint64_t bits = rng.next_bits();
-    const Vec2 b = sample_uniform_triangle(
-        {to_unit_float(static_cast<std::uint32_t>(bits >> 32)), to_unit_float(static_cast<std::uint32_t>(bits))});
+    // A parallelogram folded into the triangle.
+    const float u = to_unit_float(static_cast<std::uint32_t>(bits >> 32));
+    const float v = to_unit_float(static_cast<std::uint32_t>(bits));
+    const float b = u + v > 1 ? 1 - u : u, c = u + v > 1 ? 1 - v : v;
     const Triangle& t = surface_.triangles[triangle_];
     const Vec3& p0 = surface_.positions[t[0]];
-    return {p0 + (surface_.positions[t[1]] - p0) * b.x + (surface_.positions[t[2]] - p0) * b.y,
+    return {p0 + (surface_.positions[t[1]] - p0) * b + (surface_.positions[t[2]] - p0) * c,
             static_cast<std::uint32_t>(triangle_)};
   }
 
@@ -54,21 +59,22 @@ class CandidateStream {
   // The first triangle whose cumulative area is above x, never one without area; in steps that double, since
   // it is mostly near the last.
   void find_triangle(double x) {
-    x = std::min(x, std::nextafter(cumulative_.back(), 0.0));
-    std::size_t low = triangle_, step = 1;
+    if (cumulative_[triangle_] > x) return;
+    std::size_t low = triangle_ + 1, step = 1;
     while (low + step < cumulative_.size() && cumulative_[low + step - 1] <= x) {
       low += step;
       step *= 2;
     }
     const auto begin = cumulative_.begin() + static_cast<std::ptrdiff_t>(low);
-    const auto end = cumulative_.begin() + static_cast<std::ptrdiff_t>(std::min(low + step, cumulative_.size()));
+    const auto end =
+        cumulative_.begin() + static_cast<std::ptrdiff_t>(std::min(low + step, cumulative_.size()));
     triangle_ = static_cast<std::size_t>(std::upper_bound(begin, end, x) - cumulative_.begin());
   }
 
   const GroupSurface& surface_;
   std::span<const double> cumulative_;
-  std::uint64_t seed_, round_;
-  double stratum_;
+  std::uint64_t key_;
+  double stratum_, last_;
   std::size_t triangle_ = 0;
 };
 
@@ -81,15 +87,12 @@ class LocalGrid {
 
   void move_to(const Vec3& corner) {
     corner_ = corner;
-    heads_.fill(-1);
+    first_.fill(-1);
+    slots_.clear();
     entries_.clear();
   }
-  void add(const Point& point, const Vec3& normal) {
-    const Vec3 at = (point.position - corner_) * inverse_;
-    insert(point, normal, index(cell_of(at.x), cell_of(at.y), cell_of(at.z)));
-  }
-  /// Adds a point of a neighbour unless it is too far away to matter.
-  void add_from_outside(const Point& point) {
+  /// Adds a point of the block or of a neighbour, unless it is too far away to matter.
+  void add(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
     constexpr float kMargin = 0.51f;  // a radius, and what rounding may add
     for (int axis = 0; axis < 3; ++axis)
@@ -100,51 +103,85 @@ class LocalGrid {
   bool add_if_free(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
     const int x = cell_of(at.x), y = cell_of(at.y), z = cell_of(at.z);
-    const auto side = [](float position, int cell) { return position - static_cast<float>(cell) < 0.5f ? -1 : 1; };
+    const auto side = [](float position, int cell) {
+      return position - static_cast<float>(cell) < 0.5f ? -1 : 1;
+    };
     const int own = index(x, y, z);
-    const int dx = side(at.x, x) * index_step(0), dy = side(at.y, y) * index_step(1),
-              dz = side(at.z, z) * index_step(2);
-    Vec3 normal(0);
-    bool have_normal = false;
-    for (const int cell : {own, own + dx, own + dy, own + dz, own + dx + dy, own + dx + dz, own + dy + dz,
-                           own + dx + dy + dz})
-      for (int i = heads_[static_cast<std::size_t>(cell)]; i >= 0;) {
-        const Entry& entry = entries_[static_cast<std::size_t>(i)];
-        if ((entry.position - point.position).length2() < radius2_) {
-          if (entry.triangle == point.triangle) return false;
-          if (!have_normal) normal = surface_.normal(point.triangle), have_normal = true;
-          if (dot(entry.normal, normal) > kSameSheetCosine) return false;
-        }
-        i = entry.next;
-      }
-    insert(point, have_normal ? normal : surface_.normal(point.triangle), own);
+    const int dx = side(at.x, x) * step(0), dy = side(at.y, y) * step(1), dz = side(at.z, z) * step(2);
+    std::optional<Vec3> normal;
+    for (const int cell :
+         {own, own + dx, own + dy, own + dz, own + dx + dy, own + dx + dz, own + dy + dz, own + dx + dy + dz})
+      for (int s = first_[static_cast<std::size_t>(cell)]; s >= 0;
+           s = slots_[static_cast<std::size_t>(s)].next)
+        if (conflicts(slots_[static_cast<std::size_t>(s)], point, normal)) return false;
+    insert(point, normal ? *normal : surface_.normal(point.triangle), own);
     return true;
   }
 
  private:
   static constexpr int kSide = kBlockCells + 2;
-  struct Entry {
-    Vec3 position, normal;
-    std::uint32_t triangle;
+  static constexpr std::size_t kLanes = 4;
+  // A few points of a cell, tested at once; those that are not there are infinitely far away.
+  struct Slots {
+    std::array<float, kLanes> x, y, z;
+    int entry[kLanes];
     int next;
+    int count;
+  };
+  struct Entry {
+    Vec3 normal;
+    std::uint32_t triangle;
   };
 
-  static constexpr int index_step(int axis) { return axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide; }
-  static int index(int x, int y, int z) {
-    return (x + 1) * index_step(0) + (y + 1) * index_step(1) + (z + 1) * index_step(2);
-  }
+  static constexpr int step(int axis) { return axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide; }
+  static int index(int x, int y, int z) { return (x + 1) * step(0) + (y + 1) * step(1) + (z + 1) * step(2); }
   // Rounding may leave a point of the block just outside it.
   static int cell_of(float x) { return std::clamp(static_cast<int>(x), 0, kBlockCells - 1); }
+
+  bool conflicts(const Slots& slots, const Point& point, std::optional<Vec3>& normal) const {
+    std::array<int, kLanes> near;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const float dx = slots.x[k] - point.position.x, dy = slots.y[k] - point.position.y,
+                  dz = slots.z[k] - point.position.z;
+      near[k] = dx * dx + dy * dy + dz * dz < radius2_;
+    }
+    if ((near[0] | near[1] | near[2] | near[3]) == 0) return false;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      if (!near[k]) continue;
+      const Entry& entry = entries_[static_cast<std::size_t>(slots.entry[k])];
+      if (entry.triangle == point.triangle) return true;
+      if (!normal) normal = surface_.normal(point.triangle);
+      if (dot(entry.normal, *normal) > kSameSheetCosine) return true;
+    }
+    return false;
+  }
+
   void insert(const Point& point, const Vec3& normal, int cell) {
-    int& head = heads_[static_cast<std::size_t>(cell)];
-    entries_.push_back({point.position, normal, point.triangle, head});
-    head = static_cast<int>(entries_.size()) - 1;
+    int& first = first_[static_cast<std::size_t>(cell)];
+    if (first < 0 || slots_[static_cast<std::size_t>(first)].count == static_cast<int>(kLanes)) {
+      Slots slots;
+      slots.x.fill(std::numeric_limits<float>::infinity());
+      slots.y.fill(0);
+      slots.z.fill(0);
+      slots.next = first;
+      slots.count = 0;
+      first = static_cast<int>(slots_.size());
+      slots_.push_back(slots);
+    }
+    Slots& slots = slots_[static_cast<std::size_t>(first)];
+    const auto k = static_cast<std::size_t>(slots.count++);
+    slots.x[k] = point.position.x;
+    slots.y[k] = point.position.y;
+    slots.z[k] = point.position.z;
+    slots.entry[k] = static_cast<int>(entries_.size());
+    entries_.push_back({normal, point.triangle});
   }
 
   const GroupSurface& surface_;
   float inverse_, radius2_;
   Vec3 corner_;
-  std::array<int, kSide * kSide * kSide> heads_;
+  std::array<int, kSide * kSide * kSide> first_;
+  std::vector<Slots> slots_;
   std::vector<Entry> entries_;
 };
 
@@ -166,8 +203,9 @@ class DartThrower {
   void throw_round(std::uint64_t round, std::size_t count) {
     const Buckets candidates = sort_into_buckets(
         count, blocks_.bucket_count(), [&](std::size_t begin, std::size_t end, const auto& emit) {
-          CandidateStream stream(surface_, seed_, round, count);
-          for (std::size_t i = begin; i < end; ++i) emit(i, blocks_.bucket(blocks_.at(stream.make(i).position)));
+          CandidateStream stream(surface_, hash_words(seed_, round), count);
+          for (std::size_t i = begin; i < end; ++i)
+            emit(i, blocks_.bucket(blocks_.at(stream.make(i).position)));
         });
     for (std::uint32_t phase = 0; phase < SpaceBlocks::kPhases; ++phase) {
       const std::uint32_t first = phase * blocks_.buckets_per_phase();
@@ -222,7 +260,7 @@ class DartThrower {
     if (candidates.empty()) return;
     std::vector<Dart>& darts = scratch.darts;
     darts.clear();
-    CandidateStream stream(surface_, seed_, round, count);
+    CandidateStream stream(surface_, hash_words(seed_, round), count);
     bool one_block = true;
     for (const std::uint32_t i : candidates) {
       const Point point = stream.make(i);
@@ -234,7 +272,8 @@ class DartThrower {
     for (std::size_t i = darts.size(); i > 1; --i)
       std::swap(darts[i - 1], darts[static_cast<std::size_t>((rng.next_bits() >> 32) * i >> 32)]);
     if (!one_block)
-      std::stable_sort(darts.begin(), darts.end(), [](const Dart& a, const Dart& b) { return a.block < b.block; });
+      std::stable_sort(darts.begin(), darts.end(),
+                       [](const Dart& a, const Dart& b) { return a.block < b.block; });
     for (std::size_t begin = 0; begin < darts.size();) {
       std::size_t end = begin + 1;
       while (end < darts.size() && darts[end].block == darts[begin].block) ++end;
@@ -247,7 +286,7 @@ class DartThrower {
     const BlockAt block = SpaceBlocks::from_key(darts.front().block);
     scratch.grid.move_to(blocks_.corner(block));
     SpaceBlocks::for_each_around(block, [&](const BlockAt& near) {
-      for (const Point& point : points_[blocks_.bucket(near)]) scratch.grid.add_from_outside(point);
+      for (const Point& point : points_[blocks_.bucket(near)]) scratch.grid.add(point);
     });
     scratch.stuck.clear();
     for (const Dart& dart : darts)

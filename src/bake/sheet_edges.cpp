@@ -43,8 +43,7 @@ SheetEdgeTree::SheetEdgeTree(std::span<const SheetEdge> edges) {
   if (edges.empty()) return;
   edges_.reserve(edges.size());
   for (const Keyed& keyed : sort_along_curve(edges)) edges_.push_back(edges[keyed.index]);
-  leaf_count_ =
-      std::bit_ceil(static_cast<std::uint32_t>((edges_.size() + kLeafEdges - 1) / kLeafEdges));
+  leaf_count_ = std::bit_ceil(static_cast<std::uint32_t>((edges_.size() + kLeafEdges - 1) / kLeafEdges));
   bounds_.resize(2 * static_cast<std::size_t>(leaf_count_));  // empty boxes
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     Box3& leaf = bounds_[leaf_count_ + i / kLeafEdges];

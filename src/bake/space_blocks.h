@@ -37,14 +37,15 @@ class SpaceBlocks {
     BlockAt block;
     for (int axis = 0; axis < 3; ++axis)
       block[static_cast<std::size_t>(axis)] =
-          std::clamp(static_cast<int>(std::min((p[axis] - low_[axis]) * inverse_, 2e6f)), 0, kMostBlocks - 1) +
+          std::clamp(static_cast<int>(std::min((p[axis] - low_[axis]) * inverse_, 2e6f)), 0,
+                     kMostBlocks - 1) +
           1;
     return block;
   }
   Vec3 corner(const BlockAt& b) const {
-    return low_ + Vec3(static_cast<float>(b[0] - 1), static_cast<float>(b[1] - 1),
-                       static_cast<float>(b[2] - 1)) *
-                      size_;
+    return low_ +
+           Vec3(static_cast<float>(b[0] - 1), static_cast<float>(b[1] - 1), static_cast<float>(b[2] - 1)) *
+               size_;
   }
   static std::uint64_t key(const BlockAt& b) {
     return static_cast<std::uint64_t>(b[2]) << 42 | static_cast<std::uint64_t>(b[1]) << 21 |

@@ -21,8 +21,7 @@ namespace {
 // A convex polygon around the origin, cut by half-planes.
 class Cell {
  public:
-  explicit Cell(float half_size)
-      : count_(4), radius2_(2 * half_size * half_size) {
+  explicit Cell(float half_size) : count_(4), radius2_(2 * half_size * half_size) {
     corners_[0] = {-half_size, -half_size};
     corners_[1] = {half_size, -half_size};
     corners_[2] = {half_size, half_size};
@@ -163,20 +162,22 @@ class CellCutter {
     std::size_t count = 1;
     const float reach = kCellReach * spacing_, reach2 = square(reach);
     float length = 0, nearest2 = reach2;
-    edges_.for_each_in({point.position - Vec3(reach), point.position + Vec3(reach)}, [&](const SheetEdge& edge) {
-      if (edge.normal != Vec3(0) && dot(edge.normal, point.normal) <= kSameSheetCosine) return;
-      const Vec3 along = edge.b - edge.a;
-      const float length2 = along.length2();
-      const float t = length2 > 0 ? dot(point.position - edge.a, along) / length2 : 0.0f;
-      const Vec3 offset = edge.a + along * std::clamp(t, 0.0f, 1.0f) - point.position;
-      if (offset.length2() > reach2) return;
-      length += std::sqrt(length2);
-      if (t >= 0 && t <= 1 && count < sides.size()) sides[count++] = offset;
-      if (offset.length2() <= nearest2) {
-        nearest2 = offset.length2();
-        sides[0] = offset;
-      }
-    });
+    edges_.for_each_in({point.position - Vec3(reach), point.position + Vec3(reach)},
+                       [&](const SheetEdge& edge) {
+                         if (edge.normal != Vec3(0) && dot(edge.normal, point.normal) <= kSameSheetCosine)
+                           return;
+                         const Vec3 along = edge.b - edge.a;
+                         const float length2 = along.length2();
+                         const float t = length2 > 0 ? dot(point.position - edge.a, along) / length2 : 0.0f;
+                         const Vec3 offset = edge.a + along * std::clamp(t, 0.0f, 1.0f) - point.position;
+                         if (offset.length2() > reach2) return;
+                         length += std::sqrt(length2);
+                         if (t >= 0 && t <= 1 && count < sides.size()) sides[count++] = offset;
+                         if (offset.length2() <= nearest2) {
+                           nearest2 = offset.length2();
+                           sides[0] = offset;
+                         }
+                       });
     if (length < spacing_) return reach2;
     for (std::size_t i = 0; i < count; ++i) {
       const Vec2 flat(dot(sides[i], frame.s), dot(sides[i], frame.t));

@@ -6,13 +6,6 @@
 namespace nacre {
 namespace {
 
-// The finalizer of SplitMix64 (Stafford's variant 13).
-std::uint64_t mix(std::uint64_t x) noexcept {
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
 std::uint32_t reverse_bits(std::uint32_t x) noexcept {
   x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
   x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
@@ -59,19 +52,14 @@ std::uint32_t sobol_third(std::uint32_t index) noexcept {
 }  // namespace
 
 std::uint64_t hash_words(std::uint64_t a, std::uint64_t b, std::uint64_t c, std::uint64_t d) noexcept {
-  std::uint64_t h = mix(a + 0x9e3779b97f4a7c15ull);
-  h = mix(h ^ (b + 0x9e3779b97f4a7c15ull + (h << 6)));
-  h = mix(h ^ (c + 0x9e3779b97f4a7c15ull + (h << 6)));
-  return mix(h ^ (d + 0x9e3779b97f4a7c15ull + (h << 6)));
-}
-
-std::uint64_t Rng::next_bits() noexcept {
-  state_ += 0x9e3779b97f4a7c15ull;
-  return mix(state_);
+  std::uint64_t h = mix_bits(a + 0x9e3779b97f4a7c15ull);
+  h = mix_bits(h ^ (b + 0x9e3779b97f4a7c15ull + (h << 6)));
+  h = mix_bits(h ^ (c + 0x9e3779b97f4a7c15ull + (h << 6)));
+  return mix_bits(h ^ (d + 0x9e3779b97f4a7c15ull + (h << 6)));
 }
 
 Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept {
-  const std::uint64_t seeds = mix(scramble + 0x9e3779b97f4a7c15ull);
+  const std::uint64_t seeds = mix_bits(scramble + 0x9e3779b97f4a7c15ull);
   // Shuffling the order as well decorrelates the sequences of neighbouring pixels and lights.
   const std::uint32_t shuffled =
       owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
@@ -80,7 +68,7 @@ Vec2 sobol_2d(std::uint32_t index, std::uint64_t scramble) noexcept {
 }
 
 Vec3 sobol_3d(std::uint32_t index, std::uint64_t scramble) noexcept {
-  const std::uint64_t seeds = mix(scramble + 0x9e3779b97f4a7c15ull), third = mix(seeds);
+  const std::uint64_t seeds = mix_bits(scramble + 0x9e3779b97f4a7c15ull), third = mix_bits(seeds);
   const std::uint32_t shuffled =
       owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
   return {to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(seeds))),
@@ -91,7 +79,7 @@ Vec3 sobol_3d(std::uint32_t index, std::uint64_t scramble) noexcept {
 float sobol_1d(std::uint32_t index, std::uint64_t scramble) noexcept {
   const std::uint32_t shuffled =
       owen_scramble(index, static_cast<std::uint32_t>(scramble ^ (scramble >> 32)));
-  return to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(mix(scramble))));
+  return to_unit_float(owen_scramble(reverse_bits(shuffled), static_cast<std::uint32_t>(mix_bits(scramble))));
 }
 
 }  // namespace nacre

@@ -8,6 +8,13 @@
 
 namespace nacre {
 
+/// A well-mixed one-to-one map of 64 bits: the finalizer of SplitMix64 (Stafford's variant 13).
+inline std::uint64_t mix_bits(std::uint64_t x) noexcept {
+  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ x >> 27) * 0x94d049bb133111ebull;
+  return x ^ x >> 31;
+}
+
 /// A well-mixed 64-bit hash of up to four words.
 std::uint64_t hash_words(std::uint64_t a, std::uint64_t b = 0, std::uint64_t c = 0,
                          std::uint64_t d = 0) noexcept;
@@ -23,8 +30,9 @@ inline double to_unit_double(std::uint64_t bits) noexcept {
 /// (SplitMix64).
 class Rng {
  public:
+  static constexpr std::uint64_t kStep = 0x9e3779b97f4a7c15ull;  // from one state to the next
   explicit Rng(std::uint64_t key) noexcept : state_(key) {}
-  std::uint64_t next_bits() noexcept;
+  std::uint64_t next_bits() noexcept { return mix_bits(state_ += kStep); }
   float next_float() noexcept { return to_unit_float(static_cast<std::uint32_t>(next_bits() >> 32)); }
   double next_double() noexcept { return to_unit_double(next_bits()); }
   Vec2 next_2d() noexcept {
