@@ -34,7 +34,7 @@ const std::vector<Library> kLibraries{
     {"OpenMesh/", {"src/geometry/"}},
     {"pugixml", {"src/scene/"}},
     {"zlib.h", {"src/geometry/serialized_file.cpp"}},
-    {"xxhash", {"src/cache/"}},
+    {"xxhash", {"src/cache/", "src/bake/journal.cpp"}},
     {"flann/", {"src/bake/"}},
     {"hwy/",
      {"src/base/simd.cpp", "src/cache/lanes-inl.h", "src/cache/sum_lanes.cpp", "src/cache/sort_lanes.cpp"}},
