@@ -43,6 +43,8 @@ std::vector<Keyed> sort_by_morton_code(const std::vector<Vec3>& positions) {
 std::vector<OctreeNode> divide(const std::vector<Keyed>& keyed) {
   std::vector<OctreeNode> nodes;
   if (keyed.empty()) return nodes;
+  // About two fifths as many as samples are usual on a surface; growing would copy all of them.
+  nodes.reserve(keyed.size() / 2 + 16);
   nodes.push_back({});
   nodes[0].packed_counts = static_cast<std::uint32_t>(keyed.size());
   std::size_t level_begin = 0;
@@ -128,17 +130,24 @@ CacheGroup build_group(std::string name, double surface_area, const SurfaceSampl
   if (samples.size() > kMaxSamplesPerGroup)
     fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(),
          kMaxSamplesPerGroup);
-  const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
-
   struct Owned {
     std::array<std::vector<float>, kPlaneCount> planes;
     std::vector<OctreeNode> nodes;
   };
   const auto owned = std::make_shared<Owned>();
+  // Codes are gone before the planes come: they are what takes most memory at once.
+  std::vector<std::uint32_t> order(samples.size());
+  {
+    const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
+    owned->nodes = divide(keyed);
+    parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) order[i] = keyed[i].index;
+    });
+  }
   for (auto& plane : owned->planes) plane.resize(samples.size());
   parallel_for(samples.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t from = keyed[i].index;
+      const std::uint32_t from = order[i];
       for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
         owned->planes[a][i] = samples.positions[from][axis];
@@ -148,7 +157,6 @@ CacheGroup build_group(std::string name, double surface_area, const SurfaceSampl
       owned->planes[6][i] = samples.areas[from];
     }
   });
-  owned->nodes = divide(keyed);
 
   CacheGroup group;
   group.name = std::move(name);
