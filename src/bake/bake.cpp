@@ -86,14 +86,16 @@ std::vector<Rgb> entry_albedos(const World& world, std::size_t medium, std::span
     count += static_cast<std::uint32_t>(scene.shapes[i].mesh.triangles.size());
   }
   std::vector<Rgb> albedos(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto at = static_cast<std::size_t>(std::ranges::upper_bound(first_triangles, points[i].triangle) -
-                                             first_triangles.begin() - 1);
-    const Mesh& mesh = scene.shapes[shapes[at]].mesh;
-    const std::uint32_t triangle = points[i].triangle - first_triangles[at];
-    const Vec2 b = barycentric(mesh, mesh.triangles[triangle], points[i].position);
-    albedos[i] = surface_albedo(world, {0, shapes[at], triangle, b.x, b.y}, true);
-  }
+  parallel_for(points.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto at = static_cast<std::size_t>(std::ranges::upper_bound(first_triangles, points[i].triangle) -
+                                               first_triangles.begin() - 1);
+      const Mesh& mesh = scene.shapes[shapes[at]].mesh;
+      const std::uint32_t triangle = points[i].triangle - first_triangles[at];
+      const Vec2 b = barycentric(mesh, mesh.triangles[triangle], points[i].position);
+      albedos[i] = surface_albedo(world, {0, shapes[at], triangle, b.x, b.y}, true);
+    }
+  });
   return albedos;
 }
 
@@ -104,13 +106,17 @@ PlacedSamples place_samples(const World& world, std::size_t medium, const GroupS
   result.samples.areas = compute_area_shares(surface, placed, progress);
   result.surface_area = surface.areas.total();
   result.albedos = entry_albedos(world, medium, placed);
-  for (auto* vectors : {&result.samples.positions, &result.samples.normals}) vectors->reserve(placed.size());
-  result.extents.reserve(placed.size());
-  for (const PlacedPoint& point : placed) {
-    result.samples.positions.push_back(point.position);
-    result.samples.normals.push_back(point.normal);
-    result.extents.push_back(surface.extent(point.triangle));
-  }
+  const std::size_t count = placed.size();
+  result.samples.positions.resize(count);
+  result.samples.normals.resize(count);
+  result.extents.resize(count);
+  parallel_for(count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      result.samples.positions[i] = placed[i].position;
+      result.samples.normals[i] = placed[i].normal;
+      result.extents[i] = surface.extent(placed[i].triangle);
+    }
+  });
   return result;
 }
 

@@ -1,8 +1,8 @@
 // Dart throwing in blocks.
 #include "bake/placement.h"
 
+#include <bit>
 #include <limits>
-#include <optional>
 
 #include "bake/space_blocks.h"
 #include "nacre/base/error.h"
@@ -82,14 +82,13 @@ class CandidateStream {
 // dart can be too near to is in the eight cells around the corner nearest to it.
 class LocalGrid {
  public:
-  LocalGrid(const GroupSurface& surface, float radius)
-      : surface_(surface), inverse_(0.5f / radius), radius2_(radius * radius) {}
+  LocalGrid(std::span<const Vec3> normals, float radius)
+      : normals_(normals), inverse_(0.5f / radius), radius2_(radius * radius) {}
 
   void move_to(const Vec3& corner) {
     corner_ = corner;
     first_.fill(-1);
     slots_.clear();
-    entries_.clear();
   }
   /// Adds a point of the block or of a neighbour, unless it is too far away to matter.
   void add(const Point& point) {
@@ -98,7 +97,7 @@ class LocalGrid {
     for (int axis = 0; axis < 3; ++axis)
       if (!(at[axis] > -kMargin && at[axis] < static_cast<float>(kBlockCells) + kMargin)) return;
     const auto cell = [](float x) { return static_cast<int>(x + 1) - 1; };
-    insert(point, surface_.normal(point.triangle), index(cell(at.x), cell(at.y), cell(at.z)));
+    insert(point, index(cell(at.x), cell(at.y), cell(at.z)));
   }
   bool add_if_free(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
@@ -108,29 +107,25 @@ class LocalGrid {
     };
     const int own = index(x, y, z);
     const int dx = side(at.x, x) * step(0), dy = side(at.y, y) * step(1), dz = side(at.z, z) * step(2);
-    std::optional<Vec3> normal;
     for (const int cell :
          {own, own + dx, own + dy, own + dz, own + dx + dy, own + dx + dz, own + dy + dz, own + dx + dy + dz})
       for (int s = first_[static_cast<std::size_t>(cell)]; s >= 0;
            s = slots_[static_cast<std::size_t>(s)].next)
-        if (conflicts(slots_[static_cast<std::size_t>(s)], point, normal)) return false;
-    insert(point, normal ? *normal : surface_.normal(point.triangle), own);
+        if (conflicts(slots_[static_cast<std::size_t>(s)], point)) return false;
+    insert(point, own);
     return true;
   }
 
  private:
   static constexpr int kSide = kBlockCells + 2;
   static constexpr std::size_t kLanes = 4;
+  using Lanes [[gnu::vector_size(4 * kLanes)]] = float;
   // A few points of a cell, tested at once; those that are not there are infinitely far away.
   struct Slots {
-    std::array<float, kLanes> x, y, z;
-    int entry[kLanes];
+    Lanes x, y, z;
+    std::uint32_t triangles[kLanes];
     int next;
     int count;
-  };
-  struct Entry {
-    Vec3 normal;
-    std::uint32_t triangle;
   };
 
   static constexpr int step(int axis) { return axis == 0 ? 1 : axis == 1 ? kSide : kSide * kSide; }
@@ -138,33 +133,27 @@ class LocalGrid {
   // Rounding may leave a point of the block just outside it.
   static int cell_of(float x) { return std::clamp(static_cast<int>(x), 0, kBlockCells - 1); }
 
-  bool conflicts(const Slots& slots, const Point& point, std::optional<Vec3>& normal) const {
-    std::array<int, kLanes> near;
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const float dx = slots.x[k] - point.position.x, dy = slots.y[k] - point.position.y,
-                  dz = slots.z[k] - point.position.z;
-      near[k] = dx * dx + dy * dy + dz * dz < radius2_;
-    }
-    if ((near[0] | near[1] | near[2] | near[3]) == 0) return false;
+  bool conflicts(const Slots& slots, const Point& point) const {
+    const Lanes dx = slots.x - point.position.x, dy = slots.y - point.position.y,
+                dz = slots.z - point.position.z;
+    const auto near = dx * dx + dy * dy + dz * dz < radius2_;
+    const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(near);
+    if ((halves[0] | halves[1]) == 0) return false;
     for (std::size_t k = 0; k < kLanes; ++k) {
       if (!near[k]) continue;
-      const Entry& entry = entries_[static_cast<std::size_t>(slots.entry[k])];
-      if (entry.triangle == point.triangle) return true;
-      if (!normal) normal = surface_.normal(point.triangle);
-      if (dot(entry.normal, *normal) > kSameSheetCosine) return true;
+      const std::uint32_t other = slots.triangles[k];
+      if (other == point.triangle || dot(normals_[other], normals_[point.triangle]) > kSameSheetCosine)
+        return true;
     }
     return false;
   }
 
-  void insert(const Point& point, const Vec3& normal, int cell) {
+  void insert(const Point& point, int cell) {
     int& first = first_[static_cast<std::size_t>(cell)];
     if (first < 0 || slots_[static_cast<std::size_t>(first)].count == static_cast<int>(kLanes)) {
-      Slots slots;
-      slots.x.fill(std::numeric_limits<float>::infinity());
-      slots.y.fill(0);
-      slots.z.fill(0);
+      Slots slots{};
+      slots.x = slots.x + std::numeric_limits<float>::infinity();
       slots.next = first;
-      slots.count = 0;
       first = static_cast<int>(slots_.size());
       slots_.push_back(slots);
     }
@@ -173,16 +162,14 @@ class LocalGrid {
     slots.x[k] = point.position.x;
     slots.y[k] = point.position.y;
     slots.z[k] = point.position.z;
-    slots.entry[k] = static_cast<int>(entries_.size());
-    entries_.push_back({normal, point.triangle});
+    slots.triangles[k] = point.triangle;
   }
 
-  const GroupSurface& surface_;
+  std::span<const Vec3> normals_;  // of all triangles
   float inverse_, radius2_;
   Vec3 corner_;
   std::array<int, kSide * kSide * kSide> first_;
   std::vector<Slots> slots_;
-  std::vector<Entry> entries_;
 };
 
 Box3 bounds_of(const GroupSurface& surface) {
@@ -198,7 +185,12 @@ class DartThrower {
         seed_(seed),
         radius_(radius),
         blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target / kPointsPerBlock)),
-        points_(blocks_.bucket_count()) {}
+        normals_(surface.triangles.size()),
+        points_(blocks_.bucket_count()) {
+    parallel_for(normals_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) normals_[t] = surface_.normal(t);
+    });
+  }
 
   void throw_round(std::uint64_t round, std::size_t count) {
     const Buckets candidates = sort_into_buckets(
@@ -210,7 +202,7 @@ class DartThrower {
     for (std::uint32_t phase = 0; phase < SpaceBlocks::kPhases; ++phase) {
       const std::uint32_t first = phase * blocks_.buckets_per_phase();
       parallel_for(blocks_.buckets_per_phase(), 8, [&](std::size_t begin, std::size_t end) {
-        Scratch scratch{LocalGrid(surface_, radius_), {}, {}};
+        Scratch scratch{LocalGrid(normals_, radius_), {}, {}};
         for (std::size_t i = begin; i < end; ++i) {
           const std::uint32_t bucket = first + static_cast<std::uint32_t>(i);
           throw_into_bucket(bucket, candidates.of(bucket), round, count, scratch);
@@ -237,7 +229,7 @@ class DartThrower {
       for (std::size_t b = begin; b < end; ++b) {
         std::size_t at = begins[b];
         for (const Point& point : points_[b])
-          placed[at++] = {point.position, point.triangle, surface_.normal(point.triangle)};
+          placed[at++] = {point.position, point.triangle, normals_[point.triangle]};
         std::vector<Point>().swap(points_[b]);
       }
     });
@@ -300,6 +292,7 @@ class DartThrower {
   std::uint64_t seed_;
   float radius_;
   SpaceBlocks blocks_;
+  std::vector<Vec3> normals_;               // of triangles
   std::vector<std::vector<Point>> points_;  // by bucket
 };
 

@@ -23,14 +23,18 @@ PointBlocks::PointBlocks(std::span<const PlacedPoint> points, float reach)
                                 for (std::size_t i = begin; i < end; ++i)
                                   emit(i, blocks_.bucket(blocks_.at(points_[i].position)));
                               });
+  positions_.resize(points.size());
+  parallel_for(points.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) positions_[i] = points_[sorted_.items[i]].position;
+  });
 }
 
 void PointBlocks::find_blocks(std::uint32_t bucket, std::vector<std::uint64_t>& keys) const {
   keys.clear();
-  for (const std::uint32_t i : sorted_.of(bucket)) {
-    const std::uint64_t key = SpaceBlocks::key(blocks_.at(points_[i].position));
+  for_each_in_bucket(bucket, [&](std::uint32_t, const Vec3& position) {
+    const std::uint64_t key = SpaceBlocks::key(blocks_.at(position));
     if (keys.empty() || keys.back() != key) keys.push_back(key);
-  }
+  });
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
 }
@@ -45,14 +49,13 @@ void PointBlocks::gather(const BlockAt& block, BlockNeighbourhood& near) const {
   const auto side = static_cast<float>(BlockNeighbourhood::kBlockCells);
   constexpr float kRounding = 0.01f;
   SpaceBlocks::for_each_around(block, [&](const BlockAt& neighbour) {
-    for (const std::uint32_t i : sorted_.of(blocks_.bucket(neighbour))) {
-      const PlacedPoint& point = points_[i];
-      const Vec3 at = (point.position - near.box_.min) * near.inverse_;
+    for_each_in_bucket(blocks_.bucket(neighbour), [&](std::uint32_t i, const Vec3& position) {
+      const Vec3 at = (position - near.box_.min) * near.inverse_;
       bool within = true;
       for (int axis = 0; axis < 3; ++axis)
         within = within && at[axis] > -1 - kRounding && at[axis] < side + 1 + kRounding;
       // A bucket may hold other blocks than this one.
-      if (!within || blocks_.at(point.position) != neighbour) continue;
+      if (!within || blocks_.at(position) != neighbour) return;
       const bool own = neighbour == block;
       if (own) near.own_.push_back(i);
       std::array<int, 3> c;
@@ -62,8 +65,8 @@ void PointBlocks::gather(const BlockAt& block, BlockNeighbourhood& near) const {
                 : std::clamp(static_cast<int>(at[axis] + 1) - 1, -1, BlockNeighbourhood::kBlockCells);
       near.cells_.push_back(static_cast<std::uint16_t>(BlockNeighbourhood::row_of(c[1], c[2]) +
                                                        static_cast<std::size_t>(c[0] + 1)));
-      near.unsorted_.push_back({point.position, point.normal, i});
-    }
+      near.unsorted_.push_back({position, points_[i].normal, i});
+    });
   });
   near.sort_entries();
 }

@@ -83,19 +83,27 @@ class PointBlocks {
   template <class Visit>
   void for_each_around(const BlockNeighbourhood& near, const Visit& visit) const {
     SpaceBlocks::for_each_around(blocks_.at(points_[near.own().front()].position), [&](const BlockAt& block) {
-      for (const std::uint32_t i : sorted_.of(blocks_.bucket(block)))
-        if (blocks_.at(points_[i].position) == block) visit(i);
+      for_each_in_bucket(blocks_.bucket(block), [&](std::uint32_t i, const Vec3& position) {
+        if (blocks_.at(position) == block) visit(i);
+      });
     });
   }
 
  private:
   void find_blocks(std::uint32_t bucket, std::vector<std::uint64_t>& keys) const;
   void gather(const BlockAt& block, BlockNeighbourhood& near) const;
+  template <class Visit>
+  void for_each_in_bucket(std::uint32_t bucket, const Visit& visit) const {
+    const std::span<const std::uint32_t> items = sorted_.of(bucket);
+    const Vec3* positions = positions_.data() + (items.data() - sorted_.items.data());
+    for (std::size_t k = 0; k < items.size(); ++k) visit(items[k], positions[k]);
+  }
 
   std::span<const PlacedPoint> points_;
   float reach_;
   SpaceBlocks blocks_;
   Buckets sorted_;
+  std::vector<Vec3> positions_;  // in that order, since each is read for all the blocks around its own
 };
 
 }  // namespace nacre

@@ -118,17 +118,24 @@ class CellCutter {
       const Frame frame = make_frame(point.normal);
       Cell cell(kCellReach * spacing_);
       const float border2 = edges_near ? clip_at_edges(point, frame, cell) : reach2;
-      neighbours.clear();
-      near.for_each_near(point.position, [&](const BlockNeighbourhood::Entry& entry) {
-        const float distance2 = (entry.position - point.position).length2();
-        if (distance2 < reach2 && entry.index != i) neighbours.emplace_back(distance2, &entry);
-      });
-      std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
-        return a.first != b.first ? a.first < b.first : a.second->index < b.second->index;
-      });
-      for (const auto& [distance2, entry] : neighbours) {
-        if (distance2 > 4 * cell.radius2()) break;
-        clip_by_neighbour(point, entry->position, entry->normal, frame, cell);
+      // Nearly every cell is closed by what is that near.
+      float done2 = 0;
+      for (const float within2 : {square(kUsualReach * spacing_), reach2}) {
+        if (4 * cell.radius2() <= done2) break;
+        neighbours.clear();
+        near.for_each_near(point.position, [&](const BlockNeighbourhood::Entry& entry) {
+          const float distance2 = (entry.position - point.position).length2();
+          if (distance2 < within2 && distance2 >= done2 && entry.index != i)
+            neighbours.emplace_back(distance2, &entry);
+        });
+        std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
+          return a.first != b.first ? a.first < b.first : a.second->index < b.second->index;
+        });
+        for (const auto& [distance2, entry] : neighbours) {
+          if (distance2 > 4 * cell.radius2()) break;
+          clip_by_neighbour(point, entry->position, entry->normal, frame, cell);
+        }
+        done2 = within2;
       }
       // Where most of what is near lies on other sheets, or nothing is near at all.
       if (4 * cell.radius2() > reach2) {
@@ -143,6 +150,8 @@ class CellCutter {
   }
 
  private:
+  static constexpr float kUsualReach = 1.45f;  // spacings
+
   // The bisector in the tangent plane, the neighbour unfolded into it at its distance in space.
   static void clip_by_neighbour(const PlacedPoint& point, const Vec3& position, const Vec3& normal,
                                 const Frame& frame, Cell& cell) {

@@ -7,8 +7,8 @@ namespace nacre {
 namespace {
 
 // Least squares in log-log over spacings 0.4 to 1.4 (tests/bake/blotch_test.cpp measures it again).
-constexpr double kAtUnitSpacing = 0.0105;
-constexpr double kExponent = 2.7;
+constexpr double kAtUnitSpacing = 0.0084;
+constexpr double kExponent = 3.5;
 
 }  // namespace
 

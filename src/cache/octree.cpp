@@ -43,6 +43,8 @@ std::vector<Keyed> sort_by_morton_code(const std::vector<Vec3>& positions) {
 std::vector<OctreeNode> divide(const std::vector<Keyed>& keyed) {
   std::vector<OctreeNode> nodes;
   if (keyed.empty()) return nodes;
+  // About two fifths as many as samples are usual on a surface; growing would copy all of them.
+  nodes.reserve(keyed.size() / 2 + 16);
   nodes.push_back({});
   nodes[0].packed_counts = static_cast<std::uint32_t>(keyed.size());
   std::size_t level_begin = 0;
@@ -117,12 +119,14 @@ void compute_moments(const CacheGroup& group, OctreeNode& node) {
   }
 }
 
-// `values` in the order of `keyed`, and then they are gone.
+// Which sample comes i-th.
+using Order = std::vector<std::uint32_t>;
+
+// `values` in order, and then they are gone.
 template <class T, class U, class Store>
-void sort_into(const std::vector<Keyed>& keyed, std::vector<T>& values, std::span<U> sorted,
-               const Store& store) {
+void sort_into(const Order& order, std::vector<T>& values, std::span<U> sorted, const Store& store) {
   parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) store(sorted, i, values[keyed[i].index]);
+    for (std::size_t i = begin; i < end; ++i) store(sorted, i, values[order[i]]);
   });
   std::vector<T>().swap(values);
 }
@@ -136,18 +140,17 @@ struct OwnedGroup {
 };
 
 template <class Triple>
-void sort_triples(const std::vector<Keyed>& keyed, std::vector<Triple>& values, std::span<float> x,
-                  std::span<float> y, std::span<float> z) {
-  sort_into(keyed, values, x, [&](std::span<float>, std::size_t i, const Triple& v) {
+void sort_triples(const Order& order, std::vector<Triple>& values, std::span<float> x, std::span<float> y,
+                  std::span<float> z) {
+  sort_into(order, values, x, [&](std::span<float>, std::size_t i, const Triple& v) {
     x[i] = v.x;
     y[i] = v.y;
     z[i] = v.z;
   });
 }
 
-void sort_lights(const std::vector<Keyed>& keyed, std::vector<SampleLight>& lights, OwnedGroup& owned,
-                 CacheGroup& group) {
-  const std::size_t n = keyed.size(), count = lights.size();
+void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGroup& owned, CacheGroup& group) {
+  const std::size_t n = order.size(), count = lights.size();
   const auto all = [&](auto member) {
     return std::ranges::all_of(lights, [&](const SampleLight& light) { return (light.*member).size() == n; });
   };
@@ -166,16 +169,16 @@ void sort_lights(const std::vector<Keyed>& keyed, std::vector<SampleLight>& ligh
       const auto channel = [&](std::size_t k) {
         return std::span(owned.light_irradiance).subspan((3 * l + k) * n, n);
       };
-      sort_triples(keyed, lights[l].irradiance, channel(0), channel(1), channel(2));
+      sort_triples(order, lights[l].irradiance, channel(0), channel(1), channel(2));
     }
     if (errors) {
       const auto sorted = std::span(owned.errors).subspan(l * n, n);
-      sort_into(keyed, lights[l].errors, sorted, keep);
+      sort_into(order, lights[l].errors, sorted, keep);
       plane.errors = sorted;
     }
     if (ratios) {
       const auto sorted = std::span(owned.ratios).subspan(l * n, n);
-      sort_into(keyed, lights[l].ratios, sorted, keep);
+      sort_into(order, lights[l].ratios, sorted, keep);
       plane.ratios = sorted;
     }
   }
@@ -198,23 +201,36 @@ CacheGroup build_group(std::string name, double surface_area, SurfaceSamples sam
   if (samples.size() > kMaxSamplesPerGroup)
     fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(),
          kMaxSamplesPerGroup);
-  const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
   const auto owned = std::make_shared<OwnedGroup>();
+  // Codes are gone before the planes come, and samples as these do: that is what takes most memory at once.
+  Order order(samples.size());
+  {
+    const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
+    owned->nodes = divide(keyed);
+    parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) order[i] = keyed[i].index;
+    });
+  }
   CacheGroup group;
   group.name = std::move(name);
   group.surface_area = surface_area;
-  for (std::size_t k = 0; k < kPlaneCount; ++k) {
-    owned->planes[k].resize(samples.size());
-    group.planes[k] = owned->planes[k];
-  }
-  auto& planes = owned->planes;
-  sort_triples(keyed, samples.positions, planes[0], planes[1], planes[2]);
-  sort_triples(keyed, samples.normals, planes[3], planes[4], planes[5]);
-  sort_into(keyed, samples.areas, std::span(planes[6]),
+  const auto add_planes = [&](std::size_t first, auto& triples) {
+    for (std::size_t k = first; k < first + 3; ++k) {
+      owned->planes[k].resize(order.size());
+      group.planes[k] = owned->planes[k];
+    }
+    sort_triples(order, triples, std::span(owned->planes[first]), std::span(owned->planes[first + 1]),
+                 std::span(owned->planes[first + 2]));
+  };
+  add_planes(0, samples.positions);
+  add_planes(3, samples.normals);
+  auto& areas = owned->planes[static_cast<std::size_t>(Plane::kArea)];
+  areas.resize(order.size());
+  group.planes[static_cast<std::size_t>(Plane::kArea)] = areas;
+  sort_into(order, samples.areas, std::span(areas),
             [](std::span<float> sorted, std::size_t i, float area) { sorted[i] = area; });
-  sort_triples(keyed, samples.irradiance, planes[7], planes[8], planes[9]);
-  sort_lights(keyed, samples.lights, *owned, group);
-  owned->nodes = divide(keyed);
+  add_planes(7, samples.irradiance);
+  sort_lights(order, samples.lights, *owned, group);
   sum_nodes(group, owned->nodes);
   group.nodes = owned->nodes;
   storage.push_back(owned);
