@@ -1,6 +1,8 @@
 // Dart throwing in blocks.
 #include "bake/placement.h"
 
+#include <malloc.h>
+
 #include <bit>
 #include <limits>
 
@@ -18,12 +20,12 @@ namespace {
 constexpr double kRelativeRadius = 0.715;
 constexpr double kCandidates = 13;
 // At most so many per point at once, for the memory that they take.
-constexpr double kCandidatesAtOnce = 4;
+constexpr double kCandidatesAtOnce = 6;
 constexpr double kFewestCandidates = 256;
 
 constexpr int kBlockCells = 8;  // cells along a block's side, each two radii wide
 constexpr float kBlockRadii = 2.0f * kBlockCells;
-constexpr double kPointsPerBlock = 96;  // about, where a surface passes through
+constexpr double kPointsPerBucket = 16;  // a block has more, but most buckets hold none
 
 struct Point {
   Vec3 position;
@@ -94,8 +96,11 @@ class LocalGrid {
   void add(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
     constexpr float kMargin = 0.51f;  // a radius, and what rounding may add
+    // Without a branch for each: which of them decides is anyone's guess.
+    bool within = true;
     for (int axis = 0; axis < 3; ++axis)
-      if (!(at[axis] > -kMargin && at[axis] < static_cast<float>(kBlockCells) + kMargin)) return;
+      within &= (at[axis] > -kMargin) & (at[axis] < static_cast<float>(kBlockCells) + kMargin);
+    if (!within) return;
     const auto cell = [](float x) { return static_cast<int>(x + 1) - 1; };
     insert(point, index(cell(at.x), cell(at.y), cell(at.z)));
   }
@@ -184,7 +189,7 @@ class DartThrower {
       : surface_(surface),
         seed_(seed),
         radius_(radius),
-        blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target / kPointsPerBlock)),
+        blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target / kPointsPerBucket)),
         normals_(surface.triangles.size()),
         points_(blocks_.bucket_count()) {
     parallel_for(normals_.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -233,6 +238,8 @@ class DartThrower {
         std::vector<Point>().swap(points_[b]);
       }
     });
+    // Many small pieces of memory, which the allocator would keep for ever.
+    malloc_trim(0);
     return placed;
   }
 

@@ -4,7 +4,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t kPointsPerBlock = 96;  // about, where a surface passes through
+constexpr std::size_t kPointsPerBucket = 16;  // a block has more, but most buckets hold none
 
 Box3 bounds_of(std::span<const PlacedPoint> points) {
   Box3 box;
@@ -17,7 +17,7 @@ Box3 bounds_of(std::span<const PlacedPoint> points) {
 PointBlocks::PointBlocks(std::span<const PlacedPoint> points, float reach)
     : points_(points),
       reach_(reach),
-      blocks_(bounds_of(points), reach * BlockNeighbourhood::kBlockCells, points.size() / kPointsPerBlock) {
+      blocks_(bounds_of(points), reach * BlockNeighbourhood::kBlockCells, points.size() / kPointsPerBucket) {
   sorted_ = sort_into_buckets(points.size(), blocks_.bucket_count(),
                               [&](std::size_t begin, std::size_t end, const auto& emit) {
                                 for (std::size_t i = begin; i < end; ++i)
@@ -53,7 +53,7 @@ void PointBlocks::gather(const BlockAt& block, BlockNeighbourhood& near) const {
       const Vec3 at = (position - near.box_.min) * near.inverse_;
       bool within = true;
       for (int axis = 0; axis < 3; ++axis)
-        within = within && at[axis] > -1 - kRounding && at[axis] < side + 1 + kRounding;
+        within &= (at[axis] > -1 - kRounding) & (at[axis] < side + 1 + kRounding);
       // A bucket may hold other blocks than this one.
       if (!within || blocks_.at(position) != neighbour) return;
       const bool own = neighbour == block;

@@ -25,12 +25,12 @@ class SpaceBlocks {
   /// Blocks along an axis at most; coordinates begin at 1, so that there is room for neighbours.
   static constexpr int kMostBlocks = 1 << 20;
 
-  SpaceBlocks(const Box3& box, float size, std::size_t expected_blocks)
+  SpaceBlocks(const Box3& box, float size, std::size_t buckets)
       : low_(box.min),
         size_(size),
         inverse_(1 / size),
         mask_(std::bit_ceil(static_cast<std::uint32_t>(
-                  std::clamp<std::size_t>(expected_blocks / kPhases, 1, 1u << 26))) -
+                  std::clamp<std::size_t>(buckets >> 3 * kGroupBits, 1, 1u << 20))) -
               1) {}
 
   BlockAt at(const Vec3& p) const {
@@ -56,11 +56,15 @@ class SpaceBlocks {
     return {static_cast<int>(key & kMask), static_cast<int>(key >> 21 & kMask), static_cast<int>(key >> 42)};
   }
   std::uint32_t bucket(const BlockAt& b) const {
-    const auto phase = static_cast<std::uint32_t>((b[0] & 1) | (b[1] & 1) << 1 | (b[2] & 1) << 2);
-    const std::uint64_t mixed = key(b) * 0x9e3779b97f4a7c15ull;
-    return phase * buckets_per_phase() + (static_cast<std::uint32_t>(mixed >> 37) & mask_);
+    const auto bits = [&](int shift, int mask) {
+      return static_cast<std::uint32_t>((b[0] >> shift & mask) | (b[1] >> shift & mask) * (mask + 1) |
+                                        (b[2] >> shift & mask) * (mask + 1) * (mask + 1));
+    };
+    const std::uint64_t group = key({b[0] >> kGroupBits, b[1] >> kGroupBits, b[2] >> kGroupBits});
+    const auto hashed = static_cast<std::uint32_t>(group * 0x9e3779b97f4a7c15ull >> 37) & mask_;
+    return bits(0, 1) * buckets_per_phase() + (hashed << 2 * 3 | bits(1, 3));
   }
-  std::uint32_t buckets_per_phase() const { return mask_ + 1; }
+  std::uint32_t buckets_per_phase() const { return (mask_ + 1) << 2 * 3; }
   std::uint32_t bucket_count() const { return kPhases * buckets_per_phase(); }
   float size() const { return size_; }
 
@@ -73,6 +77,9 @@ class SpaceBlocks {
   }
 
  private:
+  // Blocks that differ in no more than their last bits have buckets side by side, for the caches.
+  static constexpr int kGroupBits = 3;
+
   Vec3 low_;
   float size_, inverse_;
   std::uint32_t mask_;
@@ -92,8 +99,8 @@ struct Buckets {
 /// end in order. Eight bytes an item while it runs, four of which stay.
 template <class ForEach>
 Buckets sort_into_buckets(std::size_t count, std::uint32_t bucket_count, const ForEach& for_each) {
-  const std::size_t chunks =
-      std::clamp<std::size_t>(count / 16384, 1, 4 * static_cast<std::size_t>(thread_count()));
+  const std::size_t chunks = std::clamp<std::size_t>(
+      count / 16384, 1, std::min<std::size_t>(16, 2 * static_cast<std::size_t>(thread_count())));
   const auto chunk_begin = [&](std::size_t c) { return count * c / chunks; };
   std::vector<std::uint32_t> bucket_of(count), places(chunks * bucket_count);
   parallel_for(chunks, 1, [&](std::size_t first, std::size_t last) {

@@ -50,9 +50,9 @@ TEST(AreaShares, PiecesWithoutASampleLeaveTheirsToTheOthers) {
   EXPECT_NEAR(sum(share(surface, points)), surface.areas.total(), 1e-3 * surface.areas.total());
 }
 
-// How far areas of cells are from the areas of all that is nearer to a point than to any other, in the mean and at
-// most, relative to the mean share. `probes` are points uniform by area; `may_own` says whether a sample is
-// on the probe's sheet.
+// How far areas of cells are from the areas of all that is nearer to a point than to any other, in the mean
+// and at most, relative to the mean share. `probes` are points uniform by area; `may_own` says whether a
+// sample is on the probe's sheet.
 struct Deviation {
   double rms = 0, largest = 0;
 };
