@@ -66,8 +66,9 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   if (!(spacing_ > 0)) spacing_ = cell_size_;
   if (promise == Promise::kCalibrated)
     allowance_ *= std::clamp(double{root.radius} / (kManyLengths * length), kFewest, 1.0);
+  // Hardly any less where that is a mean free path or more, a tenth at half of one.
   if (promise == Promise::kCalibrated)
-    own_share_ = 1 / (1 + square(2 * decay(make_profiles(medium)) * length));
+    own_share_ = 1 / (1 + 0.4 * std::pow(decay(make_profiles(medium)) * length, 6));
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
