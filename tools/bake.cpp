@@ -37,8 +37,9 @@ void run(const Options& options, const std::string& command_line) {
   params.journal = journal_path(options.output);
   if (old) {
     params.per_light = true;
-    params.fixed_eta = !fingerprint_conditions(old->fingerprint, scene.media.size()).every_eta;
-    params.interreflect = fingerprint_conditions(old->fingerprint, scene.media.size()).interreflect;
+    const BakeConditions conditions = fingerprint_conditions(old->fingerprint, scene.media.size());
+    params.fixed_eta = !conditions.every_eta;
+    params.interreflect = conditions.interreflect;
     params.only_lights = find_new_lights(options.output, *old, scene, params.shadows);
   }
   plan_bake(scene, params);  // refuses absurd sizes before anything is built

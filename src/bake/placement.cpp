@@ -25,7 +25,6 @@ constexpr double kFewestCandidates = 256;
 
 constexpr int kBlockCells = 8;  // cells along a block's side, each two radii wide
 constexpr float kBlockRadii = 2.0f * kBlockCells;
-constexpr double kPointsPerBucket = 16;  // a block has more, but most buckets hold none
 
 struct Point {
   Vec3 position;
@@ -189,7 +188,7 @@ class DartThrower {
       : surface_(surface),
         seed_(seed),
         radius_(radius),
-        blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target / kPointsPerBucket)),
+        blocks_(box, kBlockRadii * radius, static_cast<std::size_t>(target)),
         normals_(surface.triangles.size()),
         points_(blocks_.bucket_count()) {
     parallel_for(normals_.size(), 4096, [&](std::size_t begin, std::size_t end) {

@@ -4,8 +4,6 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t kPointsPerBucket = 16;  // a block has more, but most buckets hold none
-
 Box3 bounds_of(std::span<const PlacedPoint> points) {
   Box3 box;
   for (const PlacedPoint& point : points) box.extendBy(point.position);
@@ -17,7 +15,7 @@ Box3 bounds_of(std::span<const PlacedPoint> points) {
 PointBlocks::PointBlocks(std::span<const PlacedPoint> points, float reach)
     : points_(points),
       reach_(reach),
-      blocks_(bounds_of(points), reach * BlockNeighbourhood::kBlockCells, points.size() / kPointsPerBucket) {
+      blocks_(bounds_of(points), reach * BlockNeighbourhood::kBlockCells, points.size()) {
   sorted_ = sort_into_buckets(points.size(), blocks_.bucket_count(),
                               [&](std::size_t begin, std::size_t end, const auto& emit) {
                                 for (std::size_t i = begin; i < end; ++i)

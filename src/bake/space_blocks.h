@@ -25,12 +25,13 @@ class SpaceBlocks {
   /// Blocks along an axis at most; coordinates begin at 1, so that there is room for neighbours.
   static constexpr int kMostBlocks = 1 << 20;
 
-  SpaceBlocks(const Box3& box, float size, std::size_t buckets)
+  /// For about so many points.
+  SpaceBlocks(const Box3& box, float size, std::size_t points)
       : low_(box.min),
         size_(size),
         inverse_(1 / size),
         mask_(std::bit_ceil(static_cast<std::uint32_t>(
-                  std::clamp<std::size_t>(buckets >> 3 * kGroupBits, 1, 1u << 20))) -
+                  std::clamp<std::size_t>(points / kPointsPerBucket >> 3 * kGroupBits, 1, 1u << 20))) -
               1) {}
 
   BlockAt at(const Vec3& p) const {
@@ -79,6 +80,7 @@ class SpaceBlocks {
  private:
   // Blocks that differ in no more than their last bits have buckets side by side, for the caches.
   static constexpr int kGroupBits = 3;
+  static constexpr std::size_t kPointsPerBucket = 16;  // a block has more, but most buckets hold none
 
   Vec3 low_;
   float size_, inverse_;

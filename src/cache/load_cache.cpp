@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "cache/cache_layout.h"
+#include "cache/light_planes.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 #include "nacre/cache/cache_file.h"
@@ -140,15 +141,7 @@ void read_lights(const layout::SectionReader& reader, std::uint32_t index, Cache
   const auto sound = [](float v) { return std::isfinite(v) && v >= 0; };
   if (!all(irradiance, sound)) reader.damaged(layout::kLights, index, "a value is negative or not finite");
   if (!all(errors, sound)) reader.damaged(layout::kErrors, index, "a value is negative or not finite");
-  for (std::size_t l = 0; l < count; ++l) {
-    LightPlane& light = group.lights[l];
-    for (std::size_t k = 0; k < 3; ++k)
-      light.irradiance[k] = count == 1 ? group.planes[7 + k]
-                            : n > 0    ? irradiance.subspan((3 * l + k) * n, n)
-                                       : std::span<const float>();
-    if (!errors.empty()) light.errors = errors.subspan(l * n, n);
-    if (!ratios.empty()) light.ratios = ratios.subspan(l * n, n);
-  }
+  point_lights_into(group, irradiance, errors, ratios);
 }
 
 CacheGroup read_group(const layout::SectionReader& reader, std::uint32_t index) {

@@ -3,6 +3,7 @@
 
 #include <numeric>
 
+#include "cache/light_planes.h"
 #include "cache/morton.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
@@ -160,28 +161,16 @@ void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGrou
   if (errors) owned.errors.resize(n * count);
   if (ratios) owned.ratios.resize(n * count);
   for (std::size_t l = 0; l < count; ++l) {
-    LightPlane& plane = group.lights.emplace_back();
-    plane.name = lights[l].name;
-    for (std::size_t k = 0; k < 3; ++k)
-      plane.irradiance[k] = apart ? std::span<const float>(owned.light_irradiance).subspan((3 * l + k) * n, n)
-                                  : group.planes[7 + k];
-    if (apart) {
-      const auto channel = [&](std::size_t k) {
-        return std::span(owned.light_irradiance).subspan((3 * l + k) * n, n);
-      };
-      sort_triples(order, lights[l].irradiance, channel(0), channel(1), channel(2));
-    }
-    if (errors) {
-      const auto sorted = std::span(owned.errors).subspan(l * n, n);
-      sort_into(order, lights[l].errors, sorted, keep);
-      plane.errors = sorted;
-    }
-    if (ratios) {
-      const auto sorted = std::span(owned.ratios).subspan(l * n, n);
-      sort_into(order, lights[l].ratios, sorted, keep);
-      plane.ratios = sorted;
-    }
+    SampleLight& light = lights[l];
+    group.lights.emplace_back().name = light.name;
+    const auto channel = [&](std::size_t k) {
+      return std::span(owned.light_irradiance).subspan((3 * l + k) * n, n);
+    };
+    if (apart) sort_triples(order, light.irradiance, channel(0), channel(1), channel(2));
+    if (errors) sort_into(order, light.errors, std::span(owned.errors).subspan(l * n, n), keep);
+    if (ratios) sort_into(order, light.ratios, std::span(owned.ratios).subspan(l * n, n), keep);
   }
+  point_lights_into(group, owned.light_irradiance, owned.errors, owned.ratios);
 }
 
 }  // namespace

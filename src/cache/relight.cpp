@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cache/light_planes.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 #include "nacre/cache/octree.h"
@@ -16,6 +17,12 @@ const Rgb kAsBaked(1, 1, 1);
 Rgb scale_of(std::span<const LightScale> scales, const std::string& name) {
   const auto found = std::ranges::find(scales, name, &LightScale::name);
   return found == scales.end() ? kAsBaked : found->scale;
+}
+
+// What spans of a cache point to from now on, beside what they did before.
+void keep_alive(Cache& cache, std::shared_ptr<const void> owned) {
+  cache.storage = std::make_shared<const std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
+      std::move(cache.storage), std::move(owned));
 }
 
 struct RelitGroup {
@@ -73,10 +80,7 @@ void relight(Cache& cache, std::span<const double> etas, std::span<const LightSc
     const bool scaled = std::ranges::any_of(
         group.lights, [&](const LightPlane& light) { return scale_of(scales, light.name) != kAsBaked; });
     if (!scaled && group.eta == etas[g]) continue;
-    const auto owned = relight_group(group, etas[g], scales);
-    cache.storage =
-        std::make_shared<const std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
-            std::move(cache.storage), owned);
+    keep_alive(cache, relight_group(group, etas[g], scales));
   }
 }
 
@@ -115,16 +119,7 @@ std::shared_ptr<const ExtendedGroup> append_group(CacheGroup& group, const Cache
   for (const LightPlane& light : group.lights)
     for (const auto& channel : light.irradiance)
       extended->light_irradiance.insert(extended->light_irradiance.end(), channel.begin(), channel.end());
-  for (std::size_t l = 0; l < group.lights.size(); ++l) {
-    LightPlane& light = group.lights[l];
-    for (std::size_t k = 0; k < 3; ++k)
-      light.irradiance[k] = std::span<const float>(extended->light_irradiance).subspan((3 * l + k) * n, n);
-    light.errors = {};
-    light.ratios = {};
-    if (!extended->errors.empty()) light.errors = std::span<const float>(extended->errors).subspan(l * n, n);
-    if (!extended->ratios.empty())
-      light.ratios = std::span<const EtaRatios>(extended->ratios).subspan(l * n, n);
-  }
+  point_lights_into(group, extended->light_irradiance, extended->errors, extended->ratios);
   extended->nodes.assign(group.nodes.begin(), group.nodes.end());
   for (std::size_t k = 0; k < 3; ++k) group.planes[7 + k] = extended->irradiance[k];
   sum_nodes(group, extended->nodes);
@@ -157,12 +152,8 @@ void append_lights(Cache& cache, const Cache& more, const std::string& place) {
            "baked with",
            own.name);
   }
-  for (std::size_t g = 0; g < cache.groups.size(); ++g) {
-    const auto owned = append_group(cache.groups[g], more.groups[g]);
-    cache.storage =
-        std::make_shared<const std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
-            std::move(cache.storage), owned);
-  }
+  for (std::size_t g = 0; g < cache.groups.size(); ++g)
+    keep_alive(cache, append_group(cache.groups[g], more.groups[g]));
   cache.fingerprint = more.fingerprint;
 }
 
