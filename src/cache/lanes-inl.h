@@ -2,6 +2,8 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 
 #include "cache/sum_lanes.h"
 
@@ -101,9 +103,41 @@ enum NodeField {
 // And of a SumSource.
 enum SourceField { kSourceX, kSourceY, kSourceZ };
 
-HWY_INLINE void append(IndexList& list, std::uint32_t* room, hn::Vec<U> index, hn::Mask<F> mask) {
+// Stores the lanes of `mask` side by side, and as many more as a vector has; gives their number.
+#if HWY_TARGET == HWY_AVX2
+// Highway's own goes through a table that GCC 12 copies to the stack each time.
+struct CompressTable {
+  alignas(64) std::array<std::uint32_t, 256> lanes{};  // by mask: the lanes that are set, 4 bits each
+  constexpr CompressTable() {
+    for (std::uint32_t mask = 0; mask < 256; ++mask)
+      for (std::uint32_t lane = 0, shift = 0; lane < 8; ++lane)
+        if (mask >> lane & 1) {
+          lanes[mask] |= lane << shift;
+          shift += 4;
+        }
+  }
+};
+inline constexpr CompressTable kCompressTable;
+
+template <class D>
+HWY_INLINE std::size_t store_lanes(hn::Vec<D> values, hn::Mask<F> mask, D d, hn::TFromD<D>* to) {
   const U du;
-  list.grow(hn::CompressStore(index, hn::RebindMask(du, mask), du, room));
+  std::uint8_t bits[8];
+  hn::StoreMaskBits(F(), mask, bits);
+  const auto lane = hn::Shr(hn::Set(du, kCompressTable.lanes[bits[0]]), hn::ShiftLeft<2>(hn::Iota(du, 0)));
+  const auto indices = hn::IndicesFromVec(d, hn::And(lane, hn::Set(du, 7)));
+  hn::StoreU(hn::TableLookupLanes(values, indices), d, to);
+  return static_cast<std::size_t>(std::popcount(bits[0]));
+}
+#else
+template <class D>
+HWY_INLINE std::size_t store_lanes(hn::Vec<D> values, hn::Mask<F> mask, D d, hn::TFromD<D>* to) {
+  return hn::CompressStore(values, hn::RebindMask(d, mask), d, to);
+}
+#endif
+
+HWY_INLINE void append(IndexList& list, std::uint32_t* room, hn::Vec<U> index, hn::Mask<F> mask) {
+  list.grow(store_lanes(index, mask, U(), room));
 }
 
 }  // namespace nacre::lanes::HWY_NAMESPACE

@@ -76,9 +76,9 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     const auto here = hn::AndNot(far, batch.valid);
     const VF values[] = {x, y, z};
     for (int f = 0; f < SourceList::kFieldCount; ++f)
-      hn::CompressStore(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
+      store_lanes(values[f], here, df, near.field(static_cast<SourceList::Field>(f)) + near.size());
     HWY_ALIGN std::uint32_t which[hn::MaxLanes(df)];
-    const std::size_t taken = hn::CompressStore(batch.index, hn::RebindMask(U(), here), U(), which);
+    const std::size_t taken = store_lanes(batch.index, here, U(), which);
     for (std::size_t k = 0; k < taken; ++k) near.powers()[near.size() + k] = sources[which[k]].power;
     near.grow(taken);
   }
