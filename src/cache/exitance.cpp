@@ -44,7 +44,7 @@ struct Exitance::Room {
   std::array<Target, kBlockLevels + 1> targets;
   SortedNodes nodes;
   SourceList list;
-  std::vector<float> limits;  // of the target at hand
+  std::vector<Limits> limits;  // of the target at hand
   std::uint64_t evaluations = 0;
 };
 
@@ -123,12 +123,12 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   const auto data = [](const std::array<std::vector<float>, 3>& channels) {
     return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
   };
-  room.limits.resize(kLimitCount * lean_.size());
+  room.limits.resize(lean_.size());
   lanes::make_limits(
       {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(per_third_)}, share,
       lean_.size(), room.limits.data());
   // All that is nearer than the bins reach.
-  room.limits[kAsPoint] = room.limits[kInSeries] = -1;
+  room.limits[0].as_point = room.limits[0].in_series = -1;
 
   const bool certified = promise_ == Promise::kCertified;
   const float weight = certified ? 1 : kMomentWeight;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 
 #include "cache/sum_lanes.h"
 
@@ -53,33 +54,41 @@ HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
 
 HWY_INLINE VF length2(VF x, VF y, VF z) { return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))); }
 
-// A vector of indices, the last one repeated, and which of them are new.
+// A vector of indices, and which of them are of the list: it has to be padded.
 struct Batch {
+  const std::uint32_t* indices;
   hn::Vec<U> index;
   hn::Mask<F> valid;
 };
-HWY_INLINE Batch load_batch(const std::uint32_t* indices, std::size_t i, std::size_t count) {
+HWY_INLINE Batch load_batch(const IndexList& list, std::size_t i) {
   const F df;
-  const U du;
-  const std::size_t lanes = hn::Lanes(df);
-  if (i + lanes <= count) return {hn::LoadU(du, indices + i), hn::FirstN(df, lanes)};
-  HWY_ALIGN std::uint32_t rest[HWY_MAX_BYTES / 4];
-  for (std::size_t k = 0; k < lanes; ++k) rest[k] = indices[std::min(i + k, count - 1)];
-  return {hn::Load(du, rest), hn::FirstN(df, count - i)};
+  const std::uint32_t* const indices = list.data() + i;
+  return {indices, hn::LoadU(U(), indices), hn::FirstN(df, std::min(list.size() - i, hn::Lanes(df)))};
 }
 
-// Gathers one field of structures of floats at a time.
-struct Fields {
-  const float* first;
-  VI offset;
-  HWY_INLINE VF operator()(int field) const { return hn::GatherIndex(F(), first + field, offset); }
+// Four neighbouring fields of structures of floats, for a vector of indices. Structure by structure: gathers
+// take longer.
+struct FourFields {
+  VF a, b, c, d;
 };
 template <class Struct>
-HWY_INLINE Fields gather(const Struct* structs, hn::Vec<U> index) {
+HWY_INLINE FourFields load_fields(const Struct* structs, const std::uint32_t* indices, int first) {
+  const F df;
+  HWY_ALIGN float copies[4 * hn::MaxLanes(df)];
+  const float* const from = reinterpret_cast<const float*>(structs) + first;
+  for (std::size_t k = 0; k < hn::Lanes(df); ++k)
+    std::memcpy(copies + 4 * k, from + sizeof(Struct) / sizeof(float) * indices[k], 4 * sizeof(float));
+  FourFields fields;
+  hn::LoadInterleaved4(df, copies, fields.a, fields.b, fields.c, fields.d);
+  return fields;
+}
+// One.
+template <class Struct>
+HWY_INLINE VF gather(const Struct* structs, hn::Vec<U> index, int field) {
   const I di;
-  return {reinterpret_cast<const float*>(structs),
-          hn::Mul(hn::BitCast(di, index),
-                  hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float))))};
+  return hn::GatherIndex(F(), reinterpret_cast<const float*>(structs) + field,
+                         hn::Mul(hn::BitCast(di, index),
+                                 hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float)))));
 }
 // The fields of a SumNode, float by float.
 enum NodeField {
@@ -100,8 +109,9 @@ enum NodeField {
   kNodeXY,
   kNodeTint
 };
-// And of a SumSource.
+// And of a SumSource, of Limits.
 enum SourceField { kSourceX, kSourceY, kSourceZ };
+enum LimitField { kLean, kBend, kAsPoint, kInSeries };
 
 // Stores the lanes of `mask` side by side, and as many more as a vector has; gives their number.
 #if HWY_TARGET == HWY_AVX2

@@ -13,38 +13,45 @@
 HWY_BEFORE_NAMESPACE();
 namespace nacre::lanes::HWY_NAMESPACE {
 
+// Nodes that are fetched before they are at hand: they lie all over a memory that is larger than near caches.
+constexpr std::size_t kAhead = 16;
+
 void sort_nodes(const NodeTest& test, SortedNodes& lists) {
   const F df;
   const std::size_t lanes = hn::Lanes(df), count = lists.work.size();
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
+  lists.work.pad();
   for (std::size_t i = 0; i < count; i += lanes) {
-    const Batch batch = load_batch(lists.work.data(), i, count);
-    const Fields node = gather(test.nodes, batch.index);
-    const VF r2 = length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz));
-    const VF radius = node(kNodeRadius), spread = node(kNodeSpread);
+    const Batch batch = load_batch(lists.work, i);
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const SumNode& ahead = test.nodes[batch.indices[kAhead + k]];
+      __builtin_prefetch(&ahead);
+      __builtin_prefetch(&ahead.tint);
+    }
+    const auto [x, y, z, radius] = load_fields(test.nodes, batch.indices, kNodeX);
+    const auto [spread, lean, first, counts] = load_fields(test.nodes, batch.indices, kNodeSpread);
+    const VF tint = gather(test.nodes, batch.index, kNodeTint);
+    const VF r2 = length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz));
     // From the point of the target that is nearest to the node.
     const VF to_centre = hn::Sub(hn::Sqrt(r2), hn::Set(df, test.radius));
     const VF to_rim = hn::Sub(to_centre, radius);
     const VF near = test.certified ? to_rim : to_centre;
-    const VI bin = find_cell(test.bins, hn::Mul(near, near));
-    const VI row = hn::ShiftLeft<2>(bin);
-    const auto limit = [&](Limit which, VI at)
-                           HWY_ATTR { return hn::GatherIndex(df, test.limits + which, at); };
-    const VF lean = node(kNodeLean), to_lean = limit(kLean, row), to_bend = limit(kBend, row);
+    HWY_ALIGN std::uint32_t bins[hn::MaxLanes(df)];
+    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(near, near))), U(), bins);
+    const auto [to_lean, to_bend, as_point, in_series] = load_fields(test.limits, bins, kLean);
     // In a series, as a point.
     const VF moments = hn::MulAdd(hn::Set(df, test.third), radius, hn::Set(df, test.reach));
-    const VF series_error =
-        hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(node(kNodeTint), to_bend)));
+    const VF series_error = hn::MulAdd(spread, moments, hn::MulAdd(lean, to_lean, hn::Mul(tint, to_bend)));
     const VF point_error = hn::MulAdd(spread, to_bend, hn::Mul(lean, to_lean));
     const auto lit = hn::And(batch.valid, hn::Ge(spread, hn::Zero(df)));
     auto apart = hn::And(lit, hn::Gt(to_rim, hn::Zero(df)));
     apart = hn::And(apart, hn::Le(radius, hn::Mul(hn::Set(df, test.ratio), to_rim)));
-    const auto far = hn::And(apart, hn::Le(series_error, limit(kInSeries, row)));
-    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, limit(kAsPoint, row))));
+    const auto far = hn::And(apart, hn::Le(series_error, in_series));
+    const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, as_point)));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
-    const VI rim_row = hn::ShiftLeft<2>(find_cell(test.bins, hn::Mul(to_rim, to_rim)));
-    const auto scattered =
-        hn::And(hn::And(rest, hn::Gt(to_rim, hn::Zero(df))), hn::Ge(limit(kInSeries, rim_row), hn::Zero(df)));
+    const auto rim_bin = hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_rim, to_rim)));
+    const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Zero(df))),
+                                   hn::Ge(gather(test.limits, rim_bin, kInSeries), hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
         test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
@@ -61,16 +68,15 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
   const F df;
   const std::size_t lanes = hn::Lanes(df), count = lists.samples.size();
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
+  lists.samples.pad();
   for (std::size_t i = 0; i < count; i += lanes) {
-    const Batch batch = load_batch(lists.samples.data(), i, count);
-    const Fields source = gather(sources, batch.index);
-    const VF x = source(kSourceX), y = source(kSourceY), z = source(kSourceZ);
+    const Batch batch = load_batch(lists.samples, i);
+    const auto [x, y, z, spare] = load_fields(sources, batch.indices, kSourceX);
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
     const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
-    const auto far =
-        hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Zero(df))),
-                hn::Ge(hn::GatherIndex(df, test.limits + kInSeries, hn::ShiftLeft<2>(bin)), hn::Zero(df)));
+    const auto far = hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Zero(df))),
+                             hn::Ge(gather(test.limits, hn::BitCast(U(), bin), kInSeries), hn::Zero(df)));
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
     near.reserve(lanes);
     const auto here = hn::AndNot(far, batch.valid);
@@ -84,7 +90,7 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
   }
 }
 
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits) {
   const F df;
   for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
     VF point = hn::Set(df, 3e38f), series = point;
@@ -95,7 +101,7 @@ void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count,
       series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
     }
     hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), hn::LoadU(df, tables.bend + i), point, series, df,
-                          limits + kLimitCount * i);
+                          reinterpret_cast<float*>(limits + i));
   }
 }
 
@@ -141,7 +147,7 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH
 void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
   HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
 }
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits) {
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits) {
   HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, limits);
 }
 

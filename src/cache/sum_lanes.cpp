@@ -79,6 +79,7 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
   constexpr std::size_t kRun = 128;
   const Float4 middle{centre.x, centre.y, centre.z, 0};
   HWY_ALIGN Float4 offsets[kRun];
+  std::uint32_t indices[kRun + hn::MaxLanes(df)];
   // Second moments of nodes: their trace, and twice what they stretch along the offset.
   constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
   HWY_ALIGN float traces[kMoments ? kRun : 1], stretches[kMoments ? kRun : 1];
@@ -86,8 +87,10 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
   Rows<kInterpolated, 2, kRun> jets(kernel.jets);
   for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
     const std::size_t size = std::min(kRun, far.size() - begin), lanes = hn::Lanes(df);
+    std::copy_n(far.data() + begin, size, indices);
+    std::fill_n(indices + size, hn::Lanes(df), indices[size - 1]);
     for (std::size_t i = 0; i < size; ++i) {
-      const Struct& s = structs[far[begin + i]];
+      const Struct& s = structs[indices[i]];
       offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
     }
     for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
@@ -98,12 +101,10 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
       values.find(i, kernel.cell_bins, r2);
       jets.find(i, kernel.jet_bins, r2);
       if constexpr (kMoments) {
-        const Batch batch = load_batch(far.data() + begin, i, size);
-        const Fields node = gather(structs, batch.index);
-        const VF xx = node(kNodeXX), yy = node(kNodeYY), zz = node(kNodeZZ);
+        const auto [xx, yy, zz, yz] = load_fields(structs, indices + i, kNodeXX);
+        const auto [zx, xy, tint, spare] = load_fields(structs, indices + i, kNodeZX);
         const VF across =
-            hn::MulAdd(hn::Mul(x, y), node(kNodeXY),
-                       hn::MulAdd(hn::Mul(y, z), node(kNodeYZ), hn::Mul(hn::Mul(z, x), node(kNodeZX))));
+            hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
         const VF along =
             hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
         hn::Store(hn::Add(xx, hn::Add(yy, zz)), df, traces + i);
@@ -113,7 +114,7 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
     // Each sum in a register of its own.
     Float4 value{}, trace{}, slope_x{}, slope_y{}, slope_z{}, xx{}, yy{}, zz{}, yz{}, zx{}, xy{};
     for (std::size_t i = 0; i < size; ++i) {
-      const Float4 power = structs[far[begin + i]].power;
+      const Float4 power = structs[indices[i]].power;
       const Float4 x = broadcast(offsets[i][0]), y = broadcast(offsets[i][1]), z = broadcast(offsets[i][2]);
       value = mul_add(power, values(i, 0), value);
       const Float4 radial = power * jets(i, 0), bend = power * jets(i, 1);
@@ -169,14 +170,16 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest&
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
   VF sums[3] = {hn::Zero(df), hn::Zero(df), hn::Zero(df)};
   std::uint64_t added = 0;
+  lists.work.pad();
   for (std::size_t i = 0; i < count; i += lanes) {
-    const Batch batch = load_batch(lists.work.data(), i, count);
-    const Fields node = gather(test.nodes, batch.index);
-    const VF radius = node(kNodeRadius);
-    const VF r =
-        hn::Sqrt(length2(hn::Sub(node(kNodeX), cx), hn::Sub(node(kNodeY), cy), hn::Sub(node(kNodeZ), cz)));
+    const Batch batch = load_batch(lists.work, i);
+    const auto [x, y, z, radius] = load_fields(test.nodes, batch.indices, kNodeX);
+    const auto [red, green, blue, spare] = load_fields(test.nodes, batch.indices, kNodePower);
+    const VF powers[] = {red, green, blue};
+    const VF counts = gather(test.nodes, batch.index, kNodeCounts);
+    const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const auto has_children = hn::RebindMask(
-        df, hn::Ne(hn::ShiftRight<SumNode::kChildShift>(hn::BitCast(U(), node(kNodeCounts))), hn::Zero(U())));
+        df, hn::Ne(hn::ShiftRight<SumNode::kChildShift>(hn::BitCast(U(), counts)), hn::Zero(U())));
     const auto open =
         hn::And(hn::And(batch.valid, has_children), hn::Gt(radius, hn::Mul(hn::Set(df, test.ratio), r)));
     append(lists.opened, lists.opened.room(lanes), batch.index, open);
@@ -191,7 +194,7 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest&
       if constexpr (kInterpolated)
         value = hn::MulAdd(find_fraction(kernel.cell_bins, r2),
                            hn::GatherIndex(df, kernel.cells + 4 + k, row), value);
-      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, node(kNodePower + k)), value, sums[k]);
+      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, powers[k]), value, sums[k]);
     }
   }
   for (int k = 0; k < 3; ++k) total[k] += hn::GetLane(hn::SumOfLanes(df, sums[k]));

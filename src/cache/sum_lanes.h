@@ -65,6 +65,12 @@ class IndexList {
     return indices_.data() + size_;
   }
   void grow(std::size_t count) noexcept { size_ += count; }
+  /// Repeats the last index, so that whole vectors may be read.
+  void pad() {
+    if (size_ == 0) return;
+    const std::uint32_t last = indices_[size_ - 1];
+    std::fill_n(room(64), 64, last);
+  }
 
  private:
   std::vector<std::uint32_t> indices_;
@@ -73,7 +79,9 @@ class IndexList {
 
 /// What nodes at some distance are measured against: what first and second moments count against the third,
 /// and the largest of their sum that a point, a series may stand for.
-enum Limit { kLean, kBend, kAsPoint, kInSeries, kLimitCount };
+struct Limits {
+  float lean, bend, as_point, in_series;
+};
 
 /// What limits are made of, by bin and channel: the first two; what the node's own contribution allows as a
 /// point, in a series; what a share of the sum allows.
@@ -85,14 +93,14 @@ struct LimitTables {
 /// How a target looks at nodes.
 struct NodeTest {
   const SumNode* nodes;
-  Vec3 centre;          // of the target
-  float radius;         // of a ball around all its points
-  bool open_small;      // whether nodes smaller than the target are opened rather than left to its parts
-  bool certified;       // whether distances are to the nearest that a sample of the node may be
-  float ratio;          // the largest of a node's radius to its distance
-  float reach, third;   // what the spread counts, and that times the node's radius
-  DistanceBins bins;    // of the limits
-  const float* limits;  // by bin, see Limit
+  Vec3 centre;           // of the target
+  float radius;          // of a ball around all its points
+  bool open_small;       // whether nodes smaller than the target are opened rather than left to its parts
+  bool certified;        // whether distances are to the nearest that a sample of the node may be
+  float ratio;           // the largest of a node's radius to its distance
+  float reach, third;    // what the spread counts, and that times the node's radius
+  DistanceBins bins;     // of the limits
+  const Limits* limits;  // by bin
 };
 
 /// How the sum is guessed, or bounded from below.
@@ -130,7 +138,7 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total);
 /// Limits of `count` bins for a share of the sum; whole vectors are read and written.
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, float* limits);
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits);
 
 }  // namespace lanes
 }  // namespace nacre
