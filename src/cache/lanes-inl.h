@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 
 #include "cache/sum_lanes.h"
 
@@ -25,17 +24,65 @@ using U = hn::RebindToUnsigned<F>;
 using VF = hn::Vec<F>;
 using VI = hn::Vec<I>;
 
-HWY_INLINE Float4 mul_add(Float4 a, Float4 b, Float4 c) {
+// As many Float4 side by side as a vector holds, for sums whose terms have three channels.
 #if HWY_TARGET == HWY_SCALAR
-  return a * b + c;
-#else
-  const hn::FixedTag<float, 4> d;
-  const auto load = [&](const Float4& x) HWY_ATTR { return hn::Load(d, reinterpret_cast<const float*>(&x)); };
-  Float4 sum;
-  hn::Store(hn::MulAdd(load(a), load(b), load(c)), d, reinterpret_cast<float*>(&sum));
-  return sum;
-#endif
+using Quads = Float4;
+constexpr std::size_t kQuads = 1;
+// `at(i)` is where the i-th of them is.
+template <class At>
+HWY_INLINE Quads load_quads(const At& at) {
+  return *at(0);
 }
+HWY_INLINE Quads load_row(const Float4* from) { return *from; }
+template <int kLane>
+HWY_INLINE Quads spread(Quads a) {
+  return broadcast(a[kLane]);
+}
+HWY_INLINE Quads mul(Quads a, Quads b) { return a * b; }
+HWY_INLINE Quads add(Quads a, Quads b) { return a + b; }
+HWY_INLINE Quads mul_add(Quads a, Quads b, Quads c) { return a * b + c; }
+HWY_INLINE Quads no_quads() { return broadcast(0); }
+HWY_INLINE Quads first_quads(Quads a, std::size_t) { return a; }
+HWY_INLINE Float4 sum(Quads a) { return a; }
+#else
+using Quads = VF;
+constexpr std::size_t kQuads = hn::MaxLanes(F()) / 4;
+static_assert(kQuads == 1 || kQuads == 2 || kQuads == 4);
+template <class At>
+HWY_INLINE Quads load_quads(const At& at) {
+  const hn::FixedTag<float, 4> d4;
+  const auto load = [&](std::size_t i)
+                        HWY_ATTR { return hn::LoadU(d4, reinterpret_cast<const float*>(at(i))); };
+  if constexpr (kQuads == 1) {
+    return load(0);
+  } else if constexpr (kQuads == 2) {
+    return hn::Combine(F(), load(1), load(0));
+  } else {
+    const hn::Half<F> half;
+    return hn::Combine(F(), hn::Combine(half, load(3), load(2)), hn::Combine(half, load(1), load(0)));
+  }
+}
+HWY_INLINE Quads load_row(const Float4* from) { return hn::LoadU(F(), reinterpret_cast<const float*>(from)); }
+// One lane of each in all of its lanes.
+template <int kLane>
+HWY_INLINE Quads spread(Quads a) {
+  return hn::Broadcast<kLane>(a);
+}
+HWY_INLINE Quads mul(Quads a, Quads b) { return hn::Mul(a, b); }
+HWY_INLINE Quads add(Quads a, Quads b) { return hn::Add(a, b); }
+HWY_INLINE Quads mul_add(Quads a, Quads b, Quads c) { return hn::MulAdd(a, b, c); }
+HWY_INLINE Quads no_quads() { return hn::Zero(F()); }
+// The first `count`, and nothing.
+HWY_INLINE Quads first_quads(Quads a, std::size_t count) {
+  return count >= kQuads ? a : hn::IfThenElseZero(hn::FirstN(F(), 4 * count), a);
+}
+HWY_INLINE Float4 sum(Quads a) {
+  HWY_ALIGN Float4 parts[kQuads];
+  hn::Store(a, F(), reinterpret_cast<float*>(parts));
+  for (std::size_t i = 1; i < kQuads; ++i) parts[0] += parts[i];
+  return parts[0];
+}
+#endif
 
 // Where a distance lies in a table: the cell, and the fraction of it.
 HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
@@ -73,14 +120,30 @@ struct FourFields {
 };
 template <class Struct>
 HWY_INLINE FourFields load_fields(const Struct* structs, const std::uint32_t* indices, int first) {
-  const F df;
-  HWY_ALIGN float copies[4 * hn::MaxLanes(df)];
   const float* const from = reinterpret_cast<const float*>(structs) + first;
-  for (std::size_t k = 0; k < hn::Lanes(df); ++k)
-    std::memcpy(copies + 4 * k, from + sizeof(Struct) / sizeof(float) * indices[k], 4 * sizeof(float));
-  FourFields fields;
-  hn::LoadInterleaved4(df, copies, fields.a, fields.b, fields.c, fields.d);
-  return fields;
+  const auto at = [&](std::size_t i) HWY_ATTR {
+    return reinterpret_cast<const Float4*>(from + sizeof(Struct) / sizeof(float) * indices[i]);
+  };
+#if HWY_TARGET == HWY_SCALAR
+  const F df;
+  const Float4 fields = *at(0);
+  return {hn::Set(df, fields[0]), hn::Set(df, fields[1]), hn::Set(df, fields[2]), hn::Set(df, fields[3])};
+#else
+  // Blocks of four structures each are transposed.
+  const auto load = [&](std::size_t i) HWY_ATTR {
+    return load_quads([&](std::size_t block) HWY_ATTR { return at(4 * block + i); });
+  };
+  const F df;
+  const hn::Repartition<double, F> pairs;
+  const auto lower = [&](VF a, VF b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveLower(df, a, b)); };
+  const auto upper = [&](VF a, VF b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveUpper(df, a, b)); };
+  const VF s0 = load(0), s1 = load(1), s2 = load(2), s3 = load(3);
+  const auto ab01 = lower(s0, s1), ab23 = lower(s2, s3), cd01 = upper(s0, s1), cd23 = upper(s2, s3);
+  return {hn::BitCast(df, hn::InterleaveLower(pairs, ab01, ab23)),
+          hn::BitCast(df, hn::InterleaveUpper(pairs, ab01, ab23)),
+          hn::BitCast(df, hn::InterleaveLower(pairs, cd01, cd23)),
+          hn::BitCast(df, hn::InterleaveUpper(pairs, cd01, cd23))};
+#endif
 }
 // One.
 template <class Struct>

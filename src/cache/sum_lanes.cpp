@@ -28,10 +28,18 @@ struct Rows {
     hn::Store(find_cell(bins, r2), I(), row + i);
     if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
   }
-  HWY_INLINE Float4 operator()(std::size_t i, int field) const {
-    const Float4* const at = table + (kInterpolated ? 2 : 1) * (kFields * row[i] + field);
-    if constexpr (kInterpolated) return mul_add(broadcast(fraction[i]), at[1], at[0]);
-    return at[0];
+  // Those of i and what follows it.
+  HWY_INLINE Quads operator()(std::size_t i, int field) const {
+    constexpr int kStep = kInterpolated ? 2 : 1;
+    const auto at = [&](std::size_t k) HWY_ATTR { return table + kStep * (kFields * row[i + k] + field); };
+    if constexpr (kInterpolated) {
+      HWY_ALIGN Float4 fractions[kQuads];
+      for (std::size_t k = 0; k < kQuads; ++k) fractions[k] = broadcast(fraction[i + k]);
+      return mul_add(load_row(fractions), load_quads([&](std::size_t k) HWY_ATTR { return at(k) + 1; }),
+                     load_quads(at));
+    } else {
+      return load_quads(at);
+    }
   }
 };
 
@@ -40,8 +48,8 @@ HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, con
                          std::array<double, 3>& total) {
   const F df;
   // Runs of few terms are added up by floats, those in double precision.
-  constexpr std::size_t kRun = 256, kSums = 4;
-  const std::size_t lanes = hn::Lanes(df), step = std::max(lanes, kSums),
+  constexpr std::size_t kRun = 256, kSums = 4, kTerms = kSums * kQuads;
+  const std::size_t lanes = hn::Lanes(df), step = std::max(lanes, kTerms),
                     count = (list.size() + step - 1) / step * step;
   const VF cx = hn::Set(df, x.x), cy = hn::Set(df, x.y), cz = hn::Set(df, x.z);
   Rows<kInterpolated, 1, kRun> rows(kernel.cells);
@@ -54,12 +62,14 @@ HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, con
                             hn::Sub(load(SourceList::kZ), cz));
       rows.find(i, kernel.cell_bins, r2);
     }
-    Float4 sums[kSums] = {};
+    Quads sums[kSums];
+    for (Quads& s : sums) s = no_quads();
     const Float4* const power = list.powers() + begin;
-    for (std::size_t i = 0; i < size; i += kSums)
-      for (std::size_t k = 0; k < kSums; ++k) sums[k] = mul_add(power[i + k], rows(i + k, 0), sums[k]);
-    const Float4 sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-    for (std::size_t k = 0; k < 3; ++k) total[k] += static_cast<double>(sum[static_cast<int>(k)]);
+    for (std::size_t i = 0; i < size; i += kTerms)
+      for (std::size_t k = 0; k < kSums; ++k)
+        sums[k] = mul_add(load_row(power + i + k * kQuads), rows(i + k * kQuads, 0), sums[k]);
+    const Float4 all = sum(add(add(sums[0], sums[1]), add(sums[2], sums[3])));
+    for (std::size_t k = 0; k < 3; ++k) total[k] += static_cast<double>(all[static_cast<int>(k)]);
   }
 }
 
@@ -82,7 +92,7 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
   std::uint32_t indices[kRun + hn::MaxLanes(df)];
   // Second moments of nodes: their trace, and twice what they stretch along the offset.
   constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
-  HWY_ALIGN float traces[kMoments ? kRun : 1], stretches[kMoments ? kRun : 1];
+  HWY_ALIGN Float4 moments[kMoments ? kRun : 1];
   Rows<kInterpolated, 1, kRun> values(kernel.cells);
   Rows<kInterpolated, 2, kRun> jets(kernel.jets);
   for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
@@ -107,26 +117,31 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
             hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
         const VF along =
             hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
-        hn::Store(hn::Add(xx, hn::Add(yy, zz)), df, traces + i);
-        hn::Store(hn::MulAdd(hn::Set(df, 2), across, along), df, stretches + i);
+        const VF trace = hn::Add(xx, hn::Add(yy, zz)), stretch = hn::MulAdd(hn::Set(df, 2), across, along);
+        hn::StoreInterleaved4(trace, stretch, trace, stretch, df, reinterpret_cast<float*>(moments + i));
       }
     }
     // Each sum in a register of its own.
-    Float4 value{}, trace{}, slope_x{}, slope_y{}, slope_z{}, xx{}, yy{}, zz{}, yz{}, zx{}, xy{};
-    for (std::size_t i = 0; i < size; ++i) {
-      const Float4 power = structs[indices[i]].power;
-      const Float4 x = broadcast(offsets[i][0]), y = broadcast(offsets[i][1]), z = broadcast(offsets[i][2]);
+    const Quads none = no_quads();
+    Quads value = none, trace = none, slope_x = none, slope_y = none, slope_z = none, xx = none, yy = none,
+          zz = none, yz = none, zx = none, xy = none;
+    for (std::size_t i = 0; i < size; i += kQuads) {
+      const Quads power = first_quads(
+          load_quads([&](std::size_t k) HWY_ATTR { return &structs[indices[i + k]].power; }), size - i);
+      const Quads offset = load_row(offsets + i);
+      const Quads x = spread<0>(offset), y = spread<1>(offset), z = spread<2>(offset);
       value = mul_add(power, values(i, 0), value);
-      const Float4 radial = power * jets(i, 0), bend = power * jets(i, 1);
+      const Quads radial = mul(power, jets(i, 0)), bend = mul(power, jets(i, 1));
       if constexpr (kMoments) {
-        value = mul_add(radial, broadcast(traces[i]), value);
-        value = mul_add(bend, broadcast(stretches[i]), value);
+        const Quads moment = load_row(moments + i);
+        value = mul_add(radial, spread<0>(moment), value);
+        value = mul_add(bend, spread<1>(moment), value);
       }
-      trace += radial;
+      trace = add(trace, radial);
       slope_x = mul_add(radial, x, slope_x);
       slope_y = mul_add(radial, y, slope_y);
       slope_z = mul_add(radial, z, slope_z);
-      const Float4 bend_x = bend * x, bend_y = bend * y, bend_z = bend * z;
+      const Quads bend_x = mul(bend, x), bend_y = mul(bend, y), bend_z = mul(bend, z);
       xx = mul_add(bend_x, x, xx);
       yy = mul_add(bend_y, y, yy);
       zz = mul_add(bend_z, z, zz);
@@ -134,16 +149,16 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
       zx = mul_add(bend_z, x, zx);
       xy = mul_add(bend_x, y, xy);
     }
-    expansion.value += value;
-    expansion.gradient[0] += slope_x;
-    expansion.gradient[1] += slope_y;
-    expansion.gradient[2] += slope_z;
-    expansion.hessian[0] += xx + trace;
-    expansion.hessian[1] += yy + trace;
-    expansion.hessian[2] += zz + trace;
-    expansion.hessian[3] += yz;
-    expansion.hessian[4] += zx;
-    expansion.hessian[5] += xy;
+    expansion.value += sum(value);
+    expansion.gradient[0] += sum(slope_x);
+    expansion.gradient[1] += sum(slope_y);
+    expansion.gradient[2] += sum(slope_z);
+    expansion.hessian[0] += sum(add(xx, trace));
+    expansion.hessian[1] += sum(add(yy, trace));
+    expansion.hessian[2] += sum(add(zz, trace));
+    expansion.hessian[3] += sum(yz);
+    expansion.hessian[4] += sum(zx);
+    expansion.hessian[5] += sum(xy);
   }
 }
 
