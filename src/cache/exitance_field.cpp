@@ -24,6 +24,9 @@ Rgb to_rgb(Float4 v) noexcept { return {v[0], v[1], v[2]}; }
 Float4 larger(Float4 a, Float4 b) noexcept { return a > b ? a : b; }
 Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
 
+// How many hits ahead memory is fetched.
+constexpr std::size_t kAhead = 32;
+
 // Values at the nodes of a part that is known may be read.
 template <class Part>
 std::uint32_t mark_of(Part& part) noexcept {
@@ -193,52 +196,68 @@ Float4 ExitanceField::interpolate(const Patch& patch, float u, float v) const no
   return larger(value, broadcast(0));  // a parabola may undershoot where light ends
 }
 
+// The value at a place whose nodes are known; false if it has to be evaluated itself.
+bool ExitanceField::look_up(const Place& place, Rgb& value) const noexcept {
+  const std::uint32_t mark = mark_of(parts_[place.part]);
+  const auto& [a, b, c] = parts_[place.part].data;
+  const float u = place.u, v = place.v;
+  if (mark & kSteep) return false;
+  value = to_rgb(mark & kCurved ? interpolate(patches_[a], u, v)
+                                : values_[a] * broadcast(1 - u - v) + values_[b] * broadcast(u) +
+                                      values_[c] * broadcast(v));
+  return true;
+}
+
+// Fills the blocks of parts that are looked at for the first time.
+void ExitanceField::make_known(std::span<const std::uint32_t> parts, std::uint64_t& evaluations) const {
+  std::vector<std::uint32_t> blocks;
+  Recent recent;
+  for (const std::uint32_t index : parts)
+    for (const std::uint32_t node : patch(parts_[index]).nodes)
+      if (node != kNone && recent.is_new(block_of_[node]) &&
+          block_state_[block_of_[node]].load(std::memory_order_acquire) != kFull)
+        blocks.push_back(block_of_[node]);
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  await_blocks(blocks, evaluations);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    fetch_nodes(parts_[parts[std::min(i + kAhead, parts.size() - 1)]]);
+    judge(parts_[parts[i]]);
+  }
+}
+
 void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
                          std::uint64_t& evaluations) const {
-  struct Place {
-    std::uint32_t part;
-    float u, v;
+  struct Missing {
+    std::uint32_t hit;
+    Place place;
   };
+  std::vector<Missing> missing;
+  std::vector<std::uint32_t> parts, steep;
+  Recent recent;
   // What a value is made of lies all over the memory: it is fetched while hits before are at work.
-  constexpr std::size_t kAhead = 32;
-  std::vector<Place> places(hits.size());
-  std::vector<std::uint32_t> missing, blocks, steep;
-  Recent recent_parts, recent_blocks;
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    const Hit& ahead = hits[std::min(i + kAhead, hits.size() - 1)];
-    __builtin_prefetch(&parts_[first_triangle_[ahead.mesh] + ahead.triangle]);
-    Place& place = places[i];
-    place.part = find_patch(hits[i], place.u, place.v);
-    if (!(mark_of(parts_[place.part]) & kKnown) && recent_parts.is_new(place.part))
-      missing.push_back(place.part);
-  }
-  if (!missing.empty()) {
-    for (const std::uint32_t index : missing)
-      for (const std::uint32_t node : patch(parts_[index]).nodes)
-        if (node != kNone && recent_blocks.is_new(block_of_[node]) &&
-            block_state_[block_of_[node]].load(std::memory_order_acquire) != kFull)
-          blocks.push_back(block_of_[node]);
-    std::sort(blocks.begin(), blocks.end());
-    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-    await_blocks(blocks, evaluations);
-    for (std::size_t i = 0; i < missing.size(); ++i) {
-      fetch_nodes(parts_[missing[std::min(i + kAhead, missing.size() - 1)]]);
-      judge(parts_[missing[i]]);
+  std::array<Place, kAhead> ahead;
+  for (std::size_t next = 0; next < hits.size() + kAhead; ++next) {
+    Place& place = ahead[next % kAhead];
+    if (next >= kAhead) {
+      const auto i = static_cast<std::uint32_t>(next - kAhead);
+      if (!(mark_of(parts_[place.part]) & kKnown)) {
+        missing.push_back({i, place});
+        if (recent.is_new(place.part)) parts.push_back(place.part);
+      } else if (!look_up(place, exitance[i])) {
+        steep.push_back(i);
+      }
     }
+    if (next >= hits.size()) continue;
+    const Hit& further = hits[std::min(next + kAhead, hits.size() - 1)];
+    __builtin_prefetch(&parts_[first_triangle_[further.mesh] + further.triangle]);
+    place.part = find_patch(hits[next], place.u, place.v);
+    fetch_nodes(parts_[place.part]);
   }
-  for (std::size_t i = 0; i < std::min(kAhead, hits.size()); ++i) fetch_nodes(parts_[places[i].part]);
-  for (std::size_t i = 0; i < hits.size(); ++i) {
-    fetch_nodes(parts_[places[std::min(i + kAhead, hits.size() - 1)].part]);
-    const auto& [index, u, v] = places[i];
-    const std::uint32_t mark = mark_of(parts_[index]);
-    const auto& [a, b, c] = parts_[index].data;
-    if (mark & kSteep)
-      steep.push_back(static_cast<std::uint32_t>(i));
-    else if (mark & kCurved)
-      exitance[i] = to_rgb(interpolate(patches_[a], u, v));
-    else
-      exitance[i] =
-          to_rgb(values_[a] * broadcast(1 - u - v) + values_[b] * broadcast(u) + values_[c] * broadcast(v));
+  if (!missing.empty()) make_known(parts, evaluations);
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    fetch_nodes(parts_[missing[std::min(i + kAhead, missing.size() - 1)].place.part]);
+    if (!look_up(missing[i].place, exitance[missing[i].hit])) steep.push_back(missing[i].hit);
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;

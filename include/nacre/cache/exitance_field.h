@@ -66,6 +66,11 @@ class ExitanceField {
     std::array<std::uint32_t, 3> data;
     std::uint32_t mark;
   };
+  // A point in the part that it lies in.
+  struct Place {
+    std::uint32_t part;
+    float u, v;
+  };
   struct Division;
   class Divider;
 
@@ -79,6 +84,8 @@ class ExitanceField {
   void await_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fetch_nodes(const Part& part) const noexcept;
+  bool look_up(const Place& place, Rgb& value) const noexcept;
+  void make_known(std::span<const std::uint32_t> parts, std::uint64_t& evaluations) const;
   void set_value(std::uint32_t node, const Rgb& value) const noexcept;
   void judge(Part& part) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
