@@ -215,7 +215,7 @@ void run(const Options& options, const std::string& command_line) {
     show_cache(path);
   else if (extension == ".exr" || extension == ".EXR")
     show_image(path);
-  else if (is_mesh_file_name(path) && options.scene.material.empty())
+  else if (is_mesh_file_name(path) && options.scene.material.empty() && !options.scene.height)
     flawed = show_mesh(path);
   else
     flawed = show_scene(options.scene, session);

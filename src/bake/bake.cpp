@@ -239,6 +239,10 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
                             {bounces, world.shadows, params.interreflect, keeps_every_eta(scene, params)});
   }();
   Journal journal(params.journal, journal_key(fingerprint, scene, plan, params), params.journal_after);
+  if (journal.found_other())
+    progress.warn(
+        params.journal +
+        ": it is of an interrupted bake of another scene or other options, which this one replaces");
   if (journal.found() > 0) progress.say("going on with the bake that " + params.journal + " is of");
   Illumination illumination(plan, params, placed, journal, progress, report);
   const std::vector<std::string> names = light_planes(scene, params.per_light);

@@ -79,8 +79,16 @@ void Journal::open_existing() {
     fail(ErrorCode::kIo, path_, "another bake is writing to it; wait for that one, or stop it");
   }
   const Head wanted = make_head(key_);
-  Head head;
-  ready_ = read_at(descriptor_, &head, sizeof head, 0) && std::memcmp(&head, &wanted, sizeof head) == 0;
+  Head head{};
+  if (read_at(descriptor_, &head.magic, sizeof head.magic, 0) && head.magic != kMagic) {
+    ::close(descriptor_);
+    descriptor_ = -1;
+    fail(ErrorCode::kValue, path_,
+         "is not what an interrupted bake leaves, and would be replaced; give it another name");
+  }
+  const bool whole = read_at(descriptor_, &head, sizeof head, 0);
+  ready_ = whole && std::memcmp(&head, &wanted, sizeof head) == 0;
+  found_other_ = whole && !ready_;
   if (!ready_) return;
   const std::uint64_t end = read_records();
   if (::ftruncate(descriptor_, static_cast<off_t>(end)) != 0) failed_ = true;
