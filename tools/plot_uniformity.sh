@@ -43,7 +43,9 @@ set tics nomirror
 set output '$folder/uniformity_spectrum.png'
 set xlabel 'frequency, 1 / spacing'
 set ylabel 'power (random points: 1)'
-set yrange [1e-5:10]
+set xrange [0:2.4]
+set yrange [1e-6:10]
+set format y '10^{%T}'
 set key bottom right
 plot for [c = 2:7] '$bench/spectrum.csv' using 1:c with lines
 
@@ -52,8 +54,10 @@ set logscale x
 set xtics (0.4, 0.5, 0.65, 0.8, 1, 1.25, 1.6, 2)
 set xlabel 'spacing, mean free paths'
 set ylabel 'blotch, %'
-set yrange [0.05:100]
+set xrange [0.38:2.1]
+set yrange [0.02:50]
+set format y '%g'
 set key bottom right
-plot for [c = 2:8] '$bench/blotch.csv' using 1:c with linespoints
+plot for [c = 2:8] '$bench/blotch.csv' using 1:c with linespoints pointsize 0.8
 END
 echo "plot_uniformity: $folder/uniformity_spectrum.png, $folder/uniformity_blotch.png"

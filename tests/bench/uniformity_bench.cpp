@@ -52,7 +52,9 @@ std::string spectra() {
     add(columns[4], plane_spectrum(thrown, equal(thrown)));
     add(columns[5], plane_spectrum(random, equal(random)));
   }
-  std::string text = "frequency,plane,sphere,slivers,plane with area shares,thrown,random\n";
+  std::string text =
+      "frequency,nacre: plane,nacre: sphere,nacre: slivers,nacre: plane with area shares,thrown "
+      "darts,random\n";
   for (std::size_t i = 0; i < Spectrum::kBins; ++i) {
     text += fmt::format("{:.3f}", (static_cast<double>(i) + 0.5) * Spectrum::kWidth);
     for (const Spectrum& column : columns) text += fmt::format(",{:.5g}", column.power[i]);
@@ -86,7 +88,9 @@ std::string blotches() {
     middle.emplace_back((u.x - 0.5f) * 12, (u.y - 0.5f) * 12, 0.0f);
   }
   for (const PlacedPoint& point : place(sphere, kProbes, 77)) around.push_back(point.position);
-  std::string text = "spacing,plane,sphere,slivers,predicted,equal areas,thrown,random\n";
+  std::string text =
+      "spacing,nacre: plane,nacre: sphere,nacre: slivers,as nacre predicts,nacre's points with equal "
+      "areas,thrown darts,random\n";
   for (const double spacing : {0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0}) {
     fmt::print(stderr, "blotch: spacing {}\n", spacing);
     const auto target = [&](const GroupSurface& surface) {
