@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -80,7 +81,8 @@ void Journal::open_existing() {
   }
   const Head wanted = make_head(key_);
   Head head{};
-  if (read_at(descriptor_, &head.magic, sizeof head.magic, 0) && head.magic != kMagic) {
+  const ssize_t there = ::pread(descriptor_, head.magic.data(), head.magic.size(), 0);
+  if (there > 0 && !std::equal(head.magic.begin(), head.magic.begin() + there, kMagic.begin())) {
     ::close(descriptor_);
     descriptor_ = -1;
     fail(ErrorCode::kValue, path_,

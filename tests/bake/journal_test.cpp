@@ -128,9 +128,14 @@ TEST_F(JournalFile, OfAnotherBakeIsNotReplacedInSilence) {
 }
 
 TEST_F(JournalFile, OtherFilesAreLeftAlone) {
-  write("my own notes");
-  EXPECT_THROW(run(lit_scene(), params_for(path_)), Error);
-  EXPECT_EQ(read_file(path_), "my own notes");
+  for (const char* notes : {"my own notes", "short"}) {
+    write(notes);
+    EXPECT_THROW(run(lit_scene(), params_for(path_)), Error);
+    EXPECT_EQ(read_file(path_), notes);
+  }
+  // Of one that was cut off before its first bytes were there, nothing is lost.
+  write("\x89NC");
+  run(lit_scene(), params_for(path_));
 }
 
 TEST_F(JournalFile, AShortBakeLeavesNoTrace) {
