@@ -6,6 +6,7 @@
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/fingerprint.h"
 #include "nacre/cache/relight.h"
+#include "nacre/scene/validity.h"
 
 namespace nacre::tools {
 namespace {
@@ -31,6 +32,7 @@ void run(const Options& options, const std::string& command_line) {
   std::optional<Cache> old;
   if (options.add_lights) old = load_cache(options.output);
   const Scene scene = load_scene(options.scene, session);
+  session.warn(check_bodies(scene));
   BakeParams params = options.bake.params(options.common);
   params.per_light = options.per_light;
   params.fixed_eta = options.fixed_eta;

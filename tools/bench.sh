@@ -6,9 +6,9 @@ usage() {
   cat <<'END'
 usage: tools/bench.sh [--quick | --full]
 
-Builds build/bench and leaves there bench.md, tables of times and errors, and the figures in bench.json (frames)
-and micro_bench.json (inner loops). Needs what tools/setup.sh and tools/fetch_meshes.sh provide, and a machine with
-nothing else to do. --quick is a smoke test; --full measures a cache of 10 million samples, too.
+Builds build/bench and leaves there bench.md, tables of times and errors, and the figures in bench.json (frames and
+bakes) and micro_bench.json (inner loops). Needs what tools/setup.sh and tools/fetch_meshes.sh provide, and a machine
+with nothing else to do. --quick is a smoke test; --full measures caches of 10 million samples, too.
 END
 }
 

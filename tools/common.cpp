@@ -21,7 +21,7 @@ namespace nacre::tools {
 namespace {
 
 ProgressStyle progress_style(bool quiet) {
-  if (quiet) return ProgressStyle::kSilent;
+  if (quiet) return ProgressStyle::kWarnings;
   return ::isatty(STDERR_FILENO) ? ProgressStyle::kBar : ProgressStyle::kLines;
 }
 
@@ -92,10 +92,26 @@ CLI::Validator positive_number() {
           ""};
 }
 
+CLI::Validator whole_number() {
+  return {[](std::string& text) {
+            std::uint64_t value = 0;
+            const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+            if (error != std::errc() || end != text.data() + text.size())
+              return "'" + text + "' is not a whole number from 0 to 2^64 - 1";
+            return std::string();
+          },
+          ""};
+}
+
+CLI::Validator not_empty() {
+  return {[](std::string& text) { return text.empty() ? std::string("it is empty") : std::string(); }, ""};
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--threads", options.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
-  command.add_option("--seed", options.seed, "Seed of all random numbers (default: 0)");
+  command.add_option("--seed", options.seed, "Seed of all random numbers (default: 0)")
+      ->check(whole_number());
   command.add_option("--simd", options.simd,
                      "Vector instructions to use, as the report names them, or scalar (default: the best)");
   command.add_flag("--quiet", options.quiet, "No progress; warnings and errors only");
@@ -124,10 +140,12 @@ Scene load_scene(const SceneOptions& options, Session& session) {
       fail(ErrorCode::kValue, "--material",
            "there is no material '{}'; did you mean one of {}? `nacre materials` lists them", material,
            suggest_presets(material));
-    scene = make_showcase_scene(options.path, make_medium(*preset), options.height);
+    scene = make_showcase_scene(options.path, make_medium(*preset), options.height.value_or(kDefaultHeight));
   } else {
     if (!options.material.empty())
       throw UsageError("--material goes with a mesh file; a scene file names its own");
+    if (options.height)
+      throw UsageError("--height goes with a mesh file; shapes of a scene file have the size they have");
     scene = nacre::load_scene(options.path, parse_defines(options.defines));
   }
   session.warn(scene.warnings);

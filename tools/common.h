@@ -54,14 +54,19 @@ class Session {
 CLI::Validator finite_number();
 /// And above 0.
 CLI::Validator positive_number();
+/// Accepts whole numbers from 0 that fit 64 bits.
+CLI::Validator whole_number();
+/// Accepts anything but the empty word.
+CLI::Validator not_empty();
 void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// A scene file, or a mesh file with a material and a height.
 struct SceneOptions {
   std::string path, material;
-  double height = 50;
+  std::optional<double> height;  // none: kDefaultHeight
   std::vector<std::string> defines;
 };
+inline constexpr double kDefaultHeight = 50;  // mm
 void add_scene_options(CLI::App& command, SceneOptions& options);
 Scene load_scene(const SceneOptions& options, Session& session);
 

@@ -138,8 +138,9 @@ void show_group(const CacheGroup& group, const KeyValues& info) {
 }
 
 void show_cache(const std::string& path) {
-  const Cache cache = load_cache(path);
-  fmt::print("cache {}: sound\n", path);
+  std::uint32_t version = 0;
+  const Cache cache = load_cache(path, &version);
+  fmt::print("cache {}: format version {}, sound\n", path, version);
   for (const CacheGroup& group : cache.groups) show_group(group, cache.info);
   fmt::print("recorded\n");
   for (const auto& [key, value] : cache.info) fmt::print("  {}: {}\n", key, value);
@@ -167,7 +168,9 @@ bool show_scene(const SceneOptions& options, Session& session) {
   const Scene scene = load_scene(options, session);
   fmt::print("scene {}: {} shapes, {} media, {} lights, {} cameras\n", options.path, scene.shapes.size(),
              scene.media.size(), scene.lights.size(), scene.cameras.size());
-  bool flawed = !scene.warnings.empty();
+  const Warnings bodies = check_bodies(scene);
+  session.warn(bodies);
+  bool flawed = !scene.warnings.empty() || !bodies.empty();
   for (const Shape& shape : scene.shapes) {
     fmt::print("shape {} ({}, {})\n", shape.id, shape.type, shape.place);
     if (shape.medium != kNone)
@@ -212,7 +215,7 @@ void run(const Options& options, const std::string& command_line) {
     show_cache(path);
   else if (extension == ".exr" || extension == ".EXR")
     show_image(path);
-  else if (is_mesh_file_name(path) && options.scene.material.empty())
+  else if (is_mesh_file_name(path) && options.scene.material.empty() && !options.scene.height)
     flawed = show_mesh(path);
   else
     flawed = show_scene(options.scene, session);

@@ -236,18 +236,19 @@ void save_picture(const Image& image, const Picture& picture, const Options& opt
 
 // `camera` is empty where there is one.
 void report_verification(const Verification& verification, const std::string& camera, Session& session) {
+  std::string& note = session.report().notes[camera.empty() ? "verified" : "verified, " + camera];
   if (verification.points == 0) {
     session.warn({"--verify: no pixel was found that shows a translucent surface" +
                   (camera.empty() ? "" : " (camera " + camera + ")")});
+    note = "0 points: no pixel was found that shows a translucent surface";
     return;
   }
   fmt::print(
       "{}diffusion at {} points: relative RMSE {:.3f} %, largest error {:.2f} % against the exact sum\n",
       camera.empty() ? "" : camera + ": ", verification.points, 100 * verification.relative_rmse,
       100 * verification.largest);
-  session.report().notes[camera.empty() ? "verified" : "verified, " + camera] =
-      fmt::format("{} points, relative RMSE {:.6g}, largest error {:.6g}", verification.points,
-                  verification.relative_rmse, verification.largest);
+  note = fmt::format("{} points, relative RMSE {:.6g}, largest error {:.6g}", verification.points,
+                     verification.relative_rmse, verification.largest);
 }
 
 void run(const Options& options, const std::string& command_line) {
@@ -329,6 +330,7 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->add_option("--camera", options->cameras,
                    "Id of the camera (default: the first); several, one picture each, by commas or --camera "
                    "again: their ids go into the names of the pictures")
+      ->check(not_empty())
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--size", options->size, "WIDTHxHEIGHT of the picture (default: the film's)");

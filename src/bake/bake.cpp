@@ -7,6 +7,7 @@
 #include "bake/group_surface.h"
 #include "bake/illumination.h"
 #include "bake/placement.h"
+#include "bake/share_limits.h"
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
 #include "nacre/base/version.h"
@@ -104,6 +105,7 @@ PlacedSamples place_samples(const World& world, std::size_t medium, const GroupS
   const std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
   PlacedSamples result;
   result.samples.areas = compute_area_shares(surface, placed, progress);
+  limit_shares(surface, placed, result.samples.areas);
   result.surface_area = surface.areas.total();
   result.albedos = entry_albedos(world, medium, placed);
   const std::size_t count = placed.size();
@@ -239,6 +241,10 @@ Cache bake(const World& world, const BakePlan& plan, const BakeParams& params, P
                             {bounces, world.shadows, params.interreflect, keeps_every_eta(scene, params)});
   }();
   Journal journal(params.journal, journal_key(fingerprint, scene, plan, params), params.journal_after);
+  if (journal.found_other())
+    progress.warn(
+        params.journal +
+        ": it is of an interrupted bake of another scene or other options, which this one replaces");
   if (journal.found() > 0) progress.say("going on with the bake that " + params.journal + " is of");
   Illumination illumination(plan, params, placed, journal, progress, report);
   const std::vector<std::string> names = light_planes(scene, params.per_light);

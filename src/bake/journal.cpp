@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -79,8 +80,17 @@ void Journal::open_existing() {
     fail(ErrorCode::kIo, path_, "another bake is writing to it; wait for that one, or stop it");
   }
   const Head wanted = make_head(key_);
-  Head head;
-  ready_ = read_at(descriptor_, &head, sizeof head, 0) && std::memcmp(&head, &wanted, sizeof head) == 0;
+  Head head{};
+  const ssize_t there = ::pread(descriptor_, head.magic.data(), head.magic.size(), 0);
+  if (there > 0 && !std::equal(head.magic.begin(), head.magic.begin() + there, kMagic.begin())) {
+    ::close(descriptor_);
+    descriptor_ = -1;
+    fail(ErrorCode::kValue, path_,
+         "is not what an interrupted bake leaves, and would be replaced; give it another name");
+  }
+  const bool whole = read_at(descriptor_, &head, sizeof head, 0);
+  ready_ = whole && std::memcmp(&head, &wanted, sizeof head) == 0;
+  found_other_ = whole && !ready_;
   if (!ready_) return;
   const std::uint64_t end = read_records();
   if (::ftruncate(descriptor_, static_cast<off_t>(end)) != 0) failed_ = true;

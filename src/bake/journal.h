@@ -20,7 +20,8 @@ class Journal {
  public:
   /// Opens `path` if it is there; a file of another key is emptied when the first record is written. New
   /// files are made, and records written, once `after` seconds have gone by: a short bake leaves no trace. An
-  /// empty path keeps nothing. Throws Error(kIo, path) if another process has it open.
+  /// empty path keeps nothing. Throws Error(kIo, path) if another process has it open, Error(kValue, path) if
+  /// it is no journal.
   Journal(std::string path, const std::string& key, double after);
   ~Journal();
   Journal(const Journal&) = delete;
@@ -31,6 +32,8 @@ class Journal {
     std::uint64_t pass, begin;
     auto operator<=>(const Place&) const = default;
   };
+  /// Whether the file that was found is of another key.
+  bool found_other() const noexcept { return found_other_; }
   /// Number of records that were found.
   std::size_t found() const noexcept { return records_.size(); }
   /// Copies a record into `parts`, one after the other; false if there is none of that size.
@@ -52,6 +55,7 @@ class Journal {
   Stopwatch watch_;
   std::mutex mutex_;
   int descriptor_ = -1;
+  bool found_other_ = false;
   bool ready_ = false, failed_ = false;  // whether the file's head is this bake's; whether writing has failed
   std::map<Place, Record> records_;
 };

@@ -28,7 +28,7 @@ void Progress::begin(std::string stage, std::string unit, std::uint64_t total) {
 
 void Progress::advance(std::uint64_t units) {
   done_ += units;
-  if (style_ == ProgressStyle::kSilent) return;
+  if (!shows_progress()) return;
   const auto now = static_cast<std::int64_t>(watch_.seconds() * 1000);
   std::int64_t due = next_print_ms_;
   // The thread that moves the due time on is the one that prints.
@@ -41,13 +41,19 @@ void Progress::advance(std::uint64_t units) {
 
 void Progress::end() {
   const std::lock_guard lock(mutex_);
-  if (style_ != ProgressStyle::kSilent) print(true);
+  if (shows_progress()) print(true);
 }
 
 void Progress::say(const std::string& line) {
   const std::lock_guard lock(mutex_);
-  if (style_ == ProgressStyle::kSilent) return;
+  if (!shows_progress()) return;
   fmt::print(stderr, "{}{}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line);
+}
+
+void Progress::warn(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  if (style_ == ProgressStyle::kSilent) return;
+  fmt::print(stderr, "{}nacre: warning: {}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line);
 }
 
 void Progress::print(bool final) {

@@ -1,4 +1,8 @@
 // A cache as a point cloud.
+#include <algorithm>
+#include <cctype>
+#include <string_view>
+
 #include "cache/cloud_columns.h"
 #include "nacre/base/file.h"
 #include "nacre/cache/point_cloud.h"
@@ -66,8 +70,13 @@ void append_line(std::string& text, const CacheGroup& group, std::size_t i, std:
 }  // namespace
 
 void export_cloud(const Cache& cache, const std::string& path) {
-  const bool ply = path.ends_with(".ply");
-  if (!ply && !path.ends_with(".csv"))
+  const auto ends_with = [&](std::string_view ending) {
+    return path.size() >= ending.size() &&
+           std::ranges::equal(ending, path.substr(path.size() - ending.size()), {}, {},
+                              [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  };
+  const bool ply = ends_with(".ply");
+  if (!ply && !ends_with(".csv"))
     fail(ErrorCode::kUnsupported, path, "point clouds are written as .ply or .csv; end its name so");
   AtomicFile file(path);
   if (ply) return write_samples(cache, file, make_header(cache), append_bytes);

@@ -4,11 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <optional>
 
 #include "cache/cloud_columns.h"
 #include "geometry/ply_header.h"
 #include "nacre/base/file.h"
+#include "nacre/base/parallel.h"
 #include "nacre/cache/octree.h"
 #include "nacre/cache/point_cloud.h"
 
@@ -16,6 +18,10 @@ namespace nacre {
 namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{1} << 36;
+constexpr double kMostValue = 1e15;      // of any number; squares of distances stay floats
+constexpr double kMostAreaRatio = 2;     // between the areas of samples and the surface
+constexpr double kMostRepeated = 0.1;    // share of points at the place of another
+constexpr float kShortestNormal = 0.5f;  // no bake makes any but unit ones
 
 std::string unescape(std::string_view line) {
   std::string text;
@@ -63,9 +69,9 @@ Cache parse_comments(const std::vector<std::string>& comments, const std::string
 // The values of one vertex after the other, whatever their types.
 class VertexReader {
  public:
-  VertexReader(const PlyHeader& header, const PlyElement& vertex, const std::string& content,
-               std::size_t body, LineReader& lines)
-      : header_(header), vertex_(vertex), content_(content), at_(body), lines_(lines) {}
+  VertexReader(const std::string& path, const PlyHeader& header, const PlyElement& vertex,
+               const std::string& content, std::size_t body, LineReader& lines)
+      : path_(path), header_(header), vertex_(vertex), content_(content), at_(body), lines_(lines) {}
 
   void read(std::vector<double>& values) {
     values.clear();
@@ -74,12 +80,29 @@ class VertexReader {
       std::string_view line = lines_.line();
       for (std::size_t p = 0; p < vertex_.properties.size(); ++p)
         values.push_back(lines_.take_number(line, "a vertex"));
+      if (line.find_first_not_of(kBlanks) != std::string_view::npos)
+        lines_.fail_here(ErrorCode::kSyntax, "a vertex has more numbers than the {} that the header lists",
+                         vertex_.properties.size());
       return;
     }
     for (const PlyProperty& property : vertex_.properties) values.push_back(take(property.type));
   }
 
+  /// Fails if something follows the last vertex that the header does not speak of.
+  void expect_end() {
+    for (std::size_t e = 1; e < header_.elements.size(); ++e)
+      if (header_.elements[e].count > 0) return;
+    const std::string_view rest =
+        std::string_view(content_).substr(header_.binary ? at_ : lines_.next_begin());
+    if (header_.binary ? !rest.empty() : rest.find_first_not_of(kBlanks) != std::string_view::npos)
+      fail(ErrorCode::kValue, path_,
+           "{} bytes follow the last of the {} points of the header; export it again", rest.size(),
+           vertex_.count);
+  }
+
  private:
+  static constexpr const char* kBlanks = " \t\r\n\v\f";
+
   double take(const PlyType& type) {
     std::array<char, 8> bytes{};
     std::memcpy(bytes.data(), content_.data() + at_, type.bytes);  // the header's promise was checked
@@ -87,11 +110,16 @@ class VertexReader {
     if (header_.big_endian) std::reverse(bytes.begin(), bytes.begin() + static_cast<long>(type.bytes));
     std::uint64_t bits = 0;
     std::memcpy(&bits, bytes.data(), sizeof bits);
-    if (!type.is_float) return static_cast<double>(bits);
+    if (!type.is_float) {
+      const int unused = 64 - 8 * static_cast<int>(type.bytes);  // shifted out, the sign in
+      return type.is_signed ? static_cast<double>(static_cast<std::int64_t>(bits << unused) >> unused)
+                            : static_cast<double>(bits);
+    }
     return type.bytes == 4 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
                            : std::bit_cast<double>(bits);
   }
 
+  const std::string& path_;
   const PlyHeader& header_;
   const PlyElement& vertex_;
   const std::string& content_;
@@ -119,10 +147,32 @@ std::array<std::optional<std::size_t>, kPlaneCount + 1> find_columns(const PlyEl
 
 void check_value(double value, Plane plane, std::uint64_t index, const std::string& path) {
   const char* const name = kCloudColumns[static_cast<std::size_t>(plane)];
-  if (!(std::abs(value) <= double{std::numeric_limits<float>::max()}))
+  if (!std::isfinite(value))
     fail(ErrorCode::kValue, path, "{} of point {} is not a finite number", name, index);
+  if (std::abs(value) > kMostValue)
+    fail(ErrorCode::kValue, path, "{} of point {} is {:g}, more than {:g}", name, index, value, kMostValue);
   if (plane >= Plane::kArea && value < 0)
     fail(ErrorCode::kValue, path, "{} of point {} is {:g}; it has to be 0 or more", name, index, value);
+}
+
+// Fails if the samples of a group cannot be those of its surface.
+void check_group(const SurfaceSamples& samples, const CacheGroup& group, const std::string& path) {
+  double area = 0;
+  for (const float a : samples.areas) area += double{a};
+  if (area > kMostAreaRatio * group.surface_area || kMostAreaRatio * area < group.surface_area)
+    fail(ErrorCode::kValue, path,
+         "the areas of group {} add up to {:g}, and its surface has {:g}; scale them by the same factor as "
+         "the "
+         "points, squared, or leave both as they were",
+         quote_word(group.name), area, group.surface_area);
+  std::vector<std::array<float, 3>> positions;
+  for (const Vec3& p : samples.positions) positions.push_back({p.x, p.y, p.z});
+  parallel_sort(positions.begin(), positions.end(), std::less<>());
+  std::size_t repeated = 0;
+  for (std::size_t i = 1; i < positions.size(); ++i) repeated += positions[i] == positions[i - 1];
+  if (static_cast<double>(repeated) > kMostRepeated * static_cast<double>(positions.size()))
+    fail(ErrorCode::kValue, path, "{} of the {} points of group {} lie where others are; remove duplicates",
+         repeated, positions.size(), quote_word(group.name));
 }
 
 }  // namespace
@@ -156,7 +206,7 @@ Cache import_cloud(const std::string& path, const Cache* like) {
          "that it was exported from with --like");
   }
   std::vector<SurfaceSamples> samples(cache.groups.size());
-  VertexReader reader(header, vertex, content, body, lines);
+  VertexReader reader(path, header, vertex, content, body, lines);
   std::vector<double> values;
   for (std::uint64_t i = 0; i < vertex.count; ++i) {
     reader.read(values);
@@ -168,6 +218,9 @@ Cache import_cloud(const std::string& path, const Cache* like) {
     for (std::size_t e = 7; e < kPlaneCount; ++e)
       if (!std::isfinite(v[e] * v[6]))
         fail(ErrorCode::kValue, path, "{} times the area of point {} is not finite", kCloudColumns[e], i);
+    if (!(Vec3(v[3], v[4], v[5]).length() >= kShortestNormal))
+      fail(ErrorCode::kValue, path, "the normal of point {} is {:g} {:g} {:g}, which is no unit vector", i,
+           v[3], v[4], v[5]);
     const double group = columns[kPlaneCount] ? values[*columns[kPlaneCount]] : 0;
     if (!(group >= 0 && group < static_cast<double>(samples.size()) && group == std::floor(group)))
       fail(ErrorCode::kValue, path, "point {} is of group {:g}; there are {}", i, group, samples.size());
@@ -177,6 +230,8 @@ Cache import_cloud(const std::string& path, const Cache* like) {
     into.areas.push_back(v[6]);
     into.irradiance.emplace_back(v[7], v[8], v[9]);
   }
+  reader.expect_end();
+  for (std::size_t g = 0; g < samples.size(); ++g) check_group(samples[g], cache.groups[g], path);
   std::vector<std::shared_ptr<const void>> storage;
   for (std::size_t g = 0; g < samples.size(); ++g)
     cache.groups[g] = build_group(cache.groups[g].name, cache.groups[g].surface_area, samples[g], storage);

@@ -158,8 +158,9 @@ CacheGroup read_group(const layout::SectionReader& reader, std::uint32_t index) 
 
 }  // namespace
 
-Cache load_cache(const std::string& path) {
+Cache load_cache(const std::string& path, std::uint32_t* version) {
   const layout::SectionReader reader(path, layout::kCacheFiles);
+  if (version) *version = reader.version();
   Cache cache;
   cache.fingerprint = reader.texts(layout::kFingerprint, 0);
   cache.info = reader.texts(layout::kInfo, 0);

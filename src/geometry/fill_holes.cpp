@@ -10,7 +10,7 @@
 namespace nacre {
 namespace {
 
-// Edges of the largest loop that is triangulated with the least area, which takes the cube of them.
+// Edges of the largest loop that is triangulated at once with the least area, which takes the cube of them.
 constexpr std::size_t kMostEdges = 1000;
 
 // The share of its longest side, squared, that a triangle's area has to exceed.
@@ -115,16 +115,20 @@ void triangulate(const Loop& loop, const std::vector<Vec3>& positions, std::vect
   }
 }
 
-// Triangles from the loop to its middle, a new vertex.
-void fan_out(const Loop& loop, Mesh& mesh, std::vector<Triangle>& triangles) {
-  Vec3d sum(0);
-  for (const std::uint32_t vertex : loop) sum += Vec3d(mesh.positions[vertex]);
-  const auto centre = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.push_back(Vec3(sum / static_cast<double>(loop.size())));
-  if (!mesh.normals.empty()) mesh.normals.push_back(mesh.normals[loop[0]]);
-  if (!mesh.uvs.empty()) mesh.uvs.push_back(mesh.uvs[loop[0]]);
-  for (std::size_t i = 0; i < loop.size(); ++i)
-    triangles.push_back({loop[i], loop[(i + 1) % loop.size()], centre});
+// The same for a loop of any length: over every so many of its corners first, then between these and the
+// others. At a border that turns smoothly little is lost.
+void triangulate_coarsely(const Loop& loop, const std::vector<Vec3>& positions,
+                          std::vector<Triangle>& triangles) {
+  const std::size_t step = (loop.size() + kMostEdges - 1) / kMostEdges;
+  Loop coarse;
+  for (std::size_t begin = 0; begin < loop.size(); begin += step) {
+    coarse.push_back(loop[begin]);
+    Loop chain;
+    for (std::size_t i = begin; i <= std::min(begin + step, loop.size()); ++i)
+      chain.push_back(loop[i % loop.size()]);
+    if (chain.size() > 2) triangulate(chain, positions, triangles);
+  }
+  triangulate(coarse, positions, triangles);
 }
 
 // Adds the triangles of one hole, with vertices of their own where normals are given.
@@ -161,10 +165,7 @@ std::size_t fill_holes(Mesh& mesh, const std::string& place, Warnings& warnings)
   const std::vector<Loop> loops = find_loops(welded_triangles(mesh), left);
   for (const Loop& loop : loops) {
     std::vector<Triangle> patch;
-    if (loop.size() <= kMostEdges)
-      triangulate(loop, mesh.positions, patch);
-    else
-      fan_out(loop, mesh, patch);
+    triangulate_coarsely(loop, mesh.positions, patch);
     add_patch(mesh, std::move(patch));
   }
   if (left > 0)

@@ -11,9 +11,9 @@ PlyType parse_type(const LineReader& lines, std::string_view word) {
     std::string_view first, second;
     PlyType type;
   };
-  constexpr Name names[] = {{"char", "int8", {1, false}},    {"uchar", "uint8", {1, false}},
-                            {"short", "int16", {2, false}},  {"ushort", "uint16", {2, false}},
-                            {"int", "int32", {4, false}},    {"uint", "uint32", {4, false}},
+  constexpr Name names[] = {{"char", "int8", {1, false}},    {"uchar", "uint8", {1, false, false}},
+                            {"short", "int16", {2, false}},  {"ushort", "uint16", {2, false, false}},
+                            {"int", "int32", {4, false}},    {"uint", "uint32", {4, false, false}},
                             {"float", "float32", {4, true}}, {"double", "float64", {8, true}}};
   for (const Name& name : names)
     if (word == name.first || word == name.second) return name.type;

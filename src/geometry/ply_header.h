@@ -13,6 +13,7 @@ namespace nacre {
 struct PlyType {
   std::size_t bytes;
   bool is_float;
+  bool is_signed = true;
 };
 
 struct PlyProperty {

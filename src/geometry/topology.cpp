@@ -35,6 +35,9 @@ TopologyReport analyse_topology(const Mesh& mesh) {
   report.volume = signed_volume(mesh);
   report.box = bounds(mesh);
 
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    report.area_vector += Vec3d(area_vector(mesh, i)) / 2;
+
   const std::vector<Triangle> triangles = welded_triangles(mesh);
   report.degenerate_triangles = mesh.triangles.size() - triangles.size();
   for (const Triangle& t : triangles) {
@@ -90,6 +93,12 @@ std::string describe_problems(const TopologyReport& report) {
   if (report.closed() && report.flipped_edges == 0 && report.volume < 0)
     say("inside-out: faces point inward, flip the normals");
   return text;
+}
+
+std::string advise_on_borders(const TopologyReport& report) {
+  if (report.boundary_edges == 0) return "";
+  return report.is_sheet() ? "; a sheet is lit and seen as a half-space: give it thickness if it is thin"
+                           : "; fillHoles closes holes";
 }
 
 }  // namespace nacre

@@ -325,8 +325,8 @@ void Builder::warn_about_shape(const Shape& shape) {
   const TopologyReport report = analyse_topology(shape.mesh);
   const std::string problems = describe_problems(report);
   if (!problems.empty())
-    warn(shape.place, fmt::format("{} is translucent, but {}{}", shape.id, problems,
-                                  report.boundary_edges > 0 ? "; fillHoles closes holes" : ""));
+    warn(shape.place,
+         fmt::format("{} is translucent, but {}{}", shape.id, problems, advise_on_borders(report)));
   if (shape.surface == kNone) return;
   const auto& model = scene_.surfaces[static_cast<std::size_t>(shape.surface)].model;
   if (std::holds_alternative<ConductorSurface>(model))

@@ -128,8 +128,11 @@ Scene make_showcase_scene(const std::string& mesh_path, const Medium& medium, do
   to_height.setScale(scale);
   transform_mesh(object.mesh, to_foot * to_height, mesh_path);
   smooth_mesh(object.mesh, mesh_path, scene.warnings);
-  if (const std::string problems = describe_problems(analyse_topology(object.mesh)); !problems.empty())
-    scene.warnings.push_back(fmt::format("{}: the mesh is translucent, but {}", mesh_path, problems));
+  const TopologyReport report = analyse_topology(object.mesh);
+  if (const std::string problems = describe_problems(report); !problems.empty())
+    scene.warnings.push_back(fmt::format(
+        "{}: the mesh is translucent, but {}{}", mesh_path, problems,
+        report.boundary_edges > 0 && !report.is_sheet() ? "; fillHoles in a scene file closes holes" : ""));
 
   const Box3 placed = bounds(object.mesh);
   const double size = (Vec3d(placed.max) - Vec3d(placed.min)).length() / 2;

@@ -1,6 +1,9 @@
 // Judging media and their extents.
 #include "nacre/scene/validity.h"
 
+#include <map>
+
+#include "nacre/geometry/piece_faults.h"
 #include "nacre/geometry/topology.h"
 
 namespace nacre {
@@ -8,6 +11,56 @@ namespace {
 
 constexpr float kLeastAlphaPrime = 0.5f;
 constexpr double kLeastThickness = 3;  // mean free paths
+
+// Surfaces that are nearer to each other than this share the density of one: about the distance of samples.
+constexpr float kNear = 0.65f;  // mean free paths
+
+// Shapes of one medium that are warned of one by one, and what is said of the others.
+constexpr std::size_t kMostLines = 8;
+const std::map<PieceFault, const char*> kInShort{{PieceFault::kCopy, "copies"},
+                                                 {PieceFault::kNearCopy, "closer than samples are apart"},
+                                                 {PieceFault::kBackSide, "without thickness"},
+                                                 {PieceFault::kFlat, "without thickness"},
+                                                 {PieceFault::kInside, "inside others"}};
+
+// "left lies on right (scene.xml:7)", what comes of it, and what to do.
+std::string describe(const FaultyPieces& faulty, const Shape& shape, const Shape& other) {
+  const bool itself = faulty.mesh == faulty.other;
+  const std::string who =
+      faulty.pieces == 1 && !itself
+          ? shape.id
+          : fmt::format("{} of {}", faulty.pieces == 1 ? "a piece" : fmt::format("{} pieces", faulty.pieces),
+                        shape.id);
+  const std::string whom = itself ? "another piece of it" : fmt::format("{} ({})", other.id, other.place);
+  const char* const be = faulty.pieces == 1 ? "is" : "are";
+  const char* const lie = faulty.pieces == 1 ? "lies" : "lie";
+  switch (faulty.fault) {
+    case PieceFault::kCopy:
+      return fmt::format("{} {} on {}, exactly: light enters there twice; remove the copy", who, lie, whom);
+    case PieceFault::kNearCopy:
+      return fmt::format(
+          "{} {} closer to {} than samples are apart: what is below stays dark, and diffusion is some 10 to "
+          "20 "
+          "% off; remove one of them",
+          who, lie, whom);
+    case PieceFault::kBackSide:
+      return fmt::format(
+          "{} {} the back of {}, without thickness: light from either side is diffused as in a half-space; "
+          "give the shell thickness",
+          who, be, whom);
+    case PieceFault::kFlat:
+      return fmt::format(
+          "{} {} closed but {} no thickness: light from either side is diffused as in a half-space; give the "
+          "shell thickness",
+          who, be, faulty.pieces == 1 ? "has" : "have");
+    case PieceFault::kInside:
+      return fmt::format(
+          "{} {} inside {}, of the same medium: no light gets there, and samples are in vain; remove {}, or "
+          "flipNormals if {} a cavity",
+          who, lie, whom, faulty.pieces == 1 ? "it" : "them", faulty.pieces == 1 ? "it is" : "each is");
+  }
+  return "";
+}
 
 }  // namespace
 
@@ -55,6 +108,27 @@ Warnings check_validity(const Scene& scene) {
           reasons.empty() ? "" : "; ", extent.thickness_mm, extent.thickness_mm / longest, kLeastThickness);
     if (!reasons.empty())
       warnings.push_back(fmt::format("{}: {} ({}): {}", medium.place, medium_label(scene, m), size, reasons));
+  }
+  return warnings;
+}
+
+Warnings check_bodies(const Scene& scene) {
+  Warnings warnings;
+  for (std::size_t m = 0; m < scene.media.size(); ++m) {
+    const std::vector<std::uint32_t> shapes = shapes_of_medium(scene, m);
+    std::vector<const Mesh*> meshes;
+    for (const std::uint32_t i : shapes) meshes.push_back(&scene.shapes[i].mesh);
+    const float near = kNear * smallest_mean_free_path(scene.media[m]) / scene.media[m].scale;
+    std::map<PieceFault, std::size_t> counts;
+    for (const FaultyPieces& faulty : find_faulty_pieces(meshes, near)) {
+      if (++counts[faulty.fault] > kMostLines) continue;
+      const Shape &shape = scene.shapes[shapes[faulty.mesh]], &other = scene.shapes[shapes[faulty.other]];
+      warnings.push_back(shape.place + ": " + describe(faulty, shape, other));
+    }
+    for (const auto& [fault, count] : counts)
+      if (count > kMostLines)
+        warnings.push_back(fmt::format("{}: the same of {} more shapes of {}: {}", scene.media[m].place,
+                                       count - kMostLines, medium_label(scene, m), kInShort.at(fault)));
   }
   return warnings;
 }

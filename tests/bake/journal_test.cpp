@@ -106,6 +106,38 @@ TEST_F(JournalFile, OfAnotherBakeIsNotUsed) {
   EXPECT_EQ(bytes_of(run(brighter, params_for(path_))), bytes_of(run(brighter, params_for(""))));
 }
 
+// Whoever interrupted it is told, once, that it is lost.
+TEST_F(JournalFile, OfAnotherBakeIsNotReplacedInSilence) {
+  const Scene scene = lit_scene();
+  const auto said = [&](const BakeParams& params, ProgressStyle style) {
+    Progress progress(style);
+    Report report;
+    testing::internal::CaptureStderr();
+    bake(make_world(scene, params.shadows), plan_bake(scene, params), params, progress, report);
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(said(params_for(path_), ProgressStyle::kWarnings), "");
+  EXPECT_EQ(said(params_for(path_), ProgressStyle::kWarnings), "");
+  BakeParams other = params_for(path_);
+  other.seed = 5;
+  EXPECT_EQ(said(other, ProgressStyle::kWarnings),
+            "nacre: warning: " + path_ +
+                ": it is of an interrupted bake of another scene or other options, "
+                "which this one replaces\n");
+  EXPECT_EQ(said(params_for(path_), ProgressStyle::kSilent), "");
+}
+
+TEST_F(JournalFile, OtherFilesAreLeftAlone) {
+  for (const char* notes : {"my own notes", "short"}) {
+    write(notes);
+    EXPECT_THROW(run(lit_scene(), params_for(path_)), Error);
+    EXPECT_EQ(read_file(path_), notes);
+  }
+  // Of one that was cut off before its first bytes were there, nothing is lost.
+  write("\x89NC");
+  run(lit_scene(), params_for(path_));
+}
+
 TEST_F(JournalFile, AShortBakeLeavesNoTrace) {
   BakeParams params = params_for(path_);
   params.journal_after = 1000;

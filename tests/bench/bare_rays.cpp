@@ -34,26 +34,75 @@ void attach(RTCDevice device, RTCScene scene, const Mesh& mesh, unsigned index) 
   rtcReleaseGeometry(geometry);
 }
 
+// An Embree scene like that of RayTracer.
+class BareScene {
+ public:
+  explicit BareScene(const Scene& scene)
+      : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_.get())) {
+    rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    rtcSetSceneBuildQuality(scene_.get(), RTC_BUILD_QUALITY_HIGH);
+    for (std::size_t i = 0; i < scene.shapes.size(); ++i)
+      if (!scene.shapes[i].mesh.triangles.empty())
+        attach(device_.get(), scene_.get(), scene.shapes[i].mesh, static_cast<unsigned>(i));
+    rtcCommitScene(scene_.get());
+    if (rtcGetDeviceError(device_.get()) != RTC_ERROR_NONE)
+      fail(ErrorCode::kIo, "Embree", "could not build a scene for the bare loop");
+  }
+  RTCScene get() const { return scene_.get(); }
+
+ private:
+  std::unique_ptr<RTCDeviceTy, ReleaseDevice> device_;
+  std::unique_ptr<RTCSceneTy, ReleaseScene> scene_;
+};
+
+void fill(RTCRay& query, const Ray& ray) noexcept {
+  query.org_x = ray.origin.x;
+  query.org_y = ray.origin.y;
+  query.org_z = ray.origin.z;
+  query.tnear = ray.t_min;
+  query.dir_x = ray.direction.x;
+  query.dir_y = ray.direction.y;
+  query.dir_z = ray.direction.z;
+  query.time = 0;
+  query.tfar = ray.t_max;
+  query.mask = ~0u;
+  query.id = 0;
+  query.flags = 0;
+}
+
 float trace(RTCScene scene, const Ray& ray) noexcept {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query;
-  query.ray.org_x = ray.origin.x;
-  query.ray.org_y = ray.origin.y;
-  query.ray.org_z = ray.origin.z;
-  query.ray.tnear = ray.t_min;
-  query.ray.dir_x = ray.direction.x;
-  query.ray.dir_y = ray.direction.y;
-  query.ray.dir_z = ray.direction.z;
-  query.ray.time = 0;
-  query.ray.tfar = ray.t_max;
-  query.ray.mask = ~0u;
-  query.ray.id = 0;
-  query.ray.flags = 0;
+  fill(query.ray, ray);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene, &context, &query);
   return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? 0 : query.ray.tfar;
+}
+
+bool is_blocked(RTCScene scene, const Ray& ray) noexcept {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay query;
+  fill(query, ray);
+  rtcOccluded1(scene, &context, &query);
+  return query.tfar < 0;
+}
+
+// Median seconds of visit(i) for all i, on all threads.
+template <class Visit>
+double time_loop(std::size_t count, int runs, const Visit& visit) {
+  std::vector<double> seconds;
+  for (int run = 0; run < runs; ++run) {
+    const Stopwatch watch;
+    parallel_for((count + kRaysPerTask - 1) / kRaysPerTask, 1, [&](std::size_t begin, std::size_t end) {
+      const std::size_t last = std::min(end * kRaysPerTask, count);
+      for (std::size_t i = begin * kRaysPerTask; i < last; ++i) visit(i);
+    });
+    seconds.push_back(watch.seconds());
+  }
+  return median(seconds);
 }
 
 }  // namespace
@@ -75,30 +124,17 @@ std::vector<Ray> make_primary_rays(const Scene& scene, const RenderParams& param
 }
 
 BareRays time_bare_rays(const Scene& scene, const std::vector<Ray>& rays, int runs) {
-  const std::unique_ptr<RTCDeviceTy, ReleaseDevice> device(rtcNewDevice(nullptr));
-  const std::unique_ptr<RTCSceneTy, ReleaseScene> meshes(rtcNewScene(device.get()));
-  rtcSetSceneFlags(meshes.get(), RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-  rtcSetSceneBuildQuality(meshes.get(), RTC_BUILD_QUALITY_HIGH);
-  for (std::size_t i = 0; i < scene.shapes.size(); ++i)
-    if (!scene.shapes[i].mesh.triangles.empty())
-      attach(device.get(), meshes.get(), scene.shapes[i].mesh, static_cast<unsigned>(i));
-  rtcCommitScene(meshes.get());
-  if (rtcGetDeviceError(device.get()) != RTC_ERROR_NONE)
-    fail(ErrorCode::kIo, "Embree", "could not build a scene for the bare loop");
-
+  const BareScene meshes(scene);
   BareRays result{0, std::vector<float>(rays.size())};
-  std::vector<double> seconds;
-  for (int run = 0; run < runs; ++run) {
-    const Stopwatch watch;
-    parallel_for((rays.size() + kRaysPerTask - 1) / kRaysPerTask, 1, [&](std::size_t begin, std::size_t end) {
-      const std::size_t last = std::min(end * kRaysPerTask, rays.size());
-      for (std::size_t i = begin * kRaysPerTask; i < last; ++i)
-        result.distance[i] = trace(meshes.get(), rays[i]);
-    });
-    seconds.push_back(watch.seconds());
-  }
-  result.seconds = median(seconds);
+  result.seconds =
+      time_loop(rays.size(), runs, [&](std::size_t i) { result.distance[i] = trace(meshes.get(), rays[i]); });
   return result;
+}
+
+double time_bare_shadow_rays(const Scene& scene, const std::vector<Ray>& rays, int runs) {
+  const BareScene meshes(scene);
+  std::vector<std::uint8_t> blocked(rays.size());  // what is found has to go somewhere
+  return time_loop(rays.size(), runs, [&](std::size_t i) { blocked[i] = is_blocked(meshes.get(), rays[i]); });
 }
 
 double differing_share(const BareRays& rays, const Image& frame) {

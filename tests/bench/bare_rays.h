@@ -17,6 +17,9 @@ struct BareRays {
 /// Times a plain loop of rtcIntersect1 over rays, in an Embree scene like that of RayTracer.
 BareRays time_bare_rays(const Scene& scene, const std::vector<Ray>& rays, int runs);
 
+/// Seconds of a plain loop of rtcOccluded1 over rays there, median.
+double time_bare_shadow_rays(const Scene& scene, const std::vector<Ray>& rays, int runs);
+
 /// Share of the rays whose distance differs from the channel depth.Z of a frame, in bits. The loop is a
 /// yardstick only if it is 0, or next to it.
 double differing_share(const BareRays& rays, const Image& frame);

@@ -1,6 +1,13 @@
 // Scenes from files, resized and with more cameras.
 #include "bench/bench_scene.h"
 
+#include <malloc.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "nacre/cache/cache_file.h"
 #include "nacre/scene/scene_file.h"
 
 namespace nacre::bench {
@@ -78,6 +85,21 @@ Cache bake_samples(const Scene& scene, std::optional<double> points, std::option
   Progress progress;
   Report report;
   return bake(make_world(scene, params.shadows), plan_bake(scene, params), params, progress, report);
+}
+
+void reset_peak_memory() {
+  ::malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5;
+}
+
+CacheFile::CacheFile(const Cache& cache)
+    : path_(std::filesystem::temp_directory_path() / fmt::format("nacre_growth.{}.nacre", ::getpid())) {
+  save_cache(cache, path_);
+}
+
+CacheFile::~CacheFile() {
+  std::error_code ignored;
+  std::filesystem::remove(path_, ignored);
 }
 
 }  // namespace nacre::bench

@@ -31,4 +31,24 @@ World make_frame_world(const Scene& scene);
 /// Bakes in memory, with shadows; `points` as in BakeParams.
 Cache bake_samples(const Scene& scene, std::optional<double> points, std::optional<int> irradiance_samples);
 
+/// Connections to each light per sample where caches grow: enough light to sum; a default bake of 10 M
+/// samples takes an hour.
+inline constexpr int kIrradianceSamples = 16;
+
+/// Makes peak_memory_bytes() start from what is resident now (Linux: proc(5), clear_refs).
+void reset_peak_memory();
+
+/// A cache as renders find it, until the end of its life.
+class CacheFile {
+ public:
+  explicit CacheFile(const Cache& cache);
+  ~CacheFile();
+  CacheFile(const CacheFile&) = delete;
+  CacheFile& operator=(const CacheFile&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 }  // namespace nacre::bench

@@ -1,5 +1,6 @@
 // Times of whole frames, each with the error it bought: Markdown on standard output and a JSON file.
 
+#include "bench/bake_growth.h"
 #include "bench/bare_rays.h"
 #include "bench/bench_scene.h"
 #include "bench/frame_cases.h"
@@ -14,7 +15,7 @@ constexpr const char* kUsage =
     "Times diffusion against primary rays and measures its error. The tables go to standard output.\n"
     "  --quick      one view of one scene at 256x256, one run: a smoke test\n"
     "  --full       a cache of 10 million samples, too\n"
-    "  --only NAME  bunny50, bunny15, dragon, better, normalized, normalized_dragon or growth\n"
+    "  --only NAME  bunny50, bunny15, dragon, better, normalized, normalized_dragon, growth or bakes\n"
     "  -o FILE      where to write the figures as JSON (default: bench.json)\n";
 
 struct Options {
@@ -41,7 +42,7 @@ std::optional<Options> parse_options(const std::vector<std::string>& arguments) 
     else
       return std::nullopt;
   }
-  bool known = options.only.empty() || options.only == "growth";
+  bool known = options.only.empty() || options.only == "growth" || options.only == "bakes";
   for (const BenchScene& spec : bench_scenes()) known = known || options.only == spec.name;
   if (!known || (options.quick && options.full)) return std::nullopt;
   return options;
@@ -109,11 +110,13 @@ void run(const Options& options) {
     if (options.only.empty() ? options.quick && !results.cases.empty() : options.only != spec.name) continue;
     measure_scene(spec, options, results);
   }
-  if (options.only.empty() ? !options.quick : options.only == "growth")
-    measure_growth(options.quick  ? 100e3
-                   : options.full ? 10e6
-                                  : 1e6,
-                   options.quick ? 1024 : 4096, options.quick ? 1 : 3, results);
+  const double most_samples = options.quick ? 100e3 : options.full ? 10e6 : 1e6;
+  const int runs = options.quick ? 1 : 3;
+  const auto wanted = [&](const char* name) {
+    return options.only.empty() ? !options.quick : options.only == name;
+  };
+  if (wanted("growth")) measure_growth(most_samples, options.quick ? 1024 : 4096, runs, results);
+  if (wanted("bakes")) measure_bakes(most_samples, runs, results);
   fmt::print("{}", format_markdown(results));
   const std::string json = format_json(results);
   file.write(json.data(), json.size());

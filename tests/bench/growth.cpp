@@ -1,12 +1,6 @@
 // Caches and pictures of growing size.
 #include "bench/growth.h"
 
-#include <malloc.h>
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
-
 #include "bench/bench_scene.h"
 #include "bench/frame_cases.h"
 #include "nacre/cache/cache_file.h"
@@ -14,32 +8,8 @@
 namespace nacre::bench {
 namespace {
 
-constexpr int kIrradianceSamples = 16;  // enough light to sum; a default bake of 10 M samples takes an hour
 constexpr int kSize = 512;
 constexpr double kSamples = 200e3;
-
-// Makes peak_memory_bytes() start from what is resident now (Linux: proc(5), clear_refs).
-void reset_peak_memory() {
-  ::malloc_trim(0);
-  std::ofstream("/proc/self/clear_refs") << 5;
-}
-
-// A cache as renders find it, until the end of its life.
-class CacheFile {
- public:
-  explicit CacheFile(const Cache& cache) { save_cache(cache, path_); }
-  ~CacheFile() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  CacheFile(const CacheFile&) = delete;
-  CacheFile& operator=(const CacheFile&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_ =
-      std::filesystem::temp_directory_path() / fmt::format("nacre_growth.{}.nacre", ::getpid());
-};
 
 GrowthRow measure(const World& world, const Cache& cache, int size, int runs) {
   reset_peak_memory();

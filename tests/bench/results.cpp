@@ -86,6 +86,37 @@ std::string growth_table(const std::string& title, const std::vector<GrowthRow>&
   return text + "\n";
 }
 
+std::string bake_table(const std::vector<BakeRow>& rows) {
+  std::string text =
+      "## Growth of the bake\n\nSeconds. Bare: as many shadow rays in a plain loop of rtcOccluded1.\n\n"
+      "| samples | placement and shares | irradiance | octree | writing | total | us per sample | bytes per "
+      "sample at the peak | shadow rays | bare | total / bare |\n"
+      "|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
+  for (const BakeRow& row : rows)
+    text += fmt::format(
+        "| {:.0f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.2f} | {:.0f} | {:.3g} | {:.3f} | {:.2f} "
+        "|\n",
+        row.samples, row.placement_seconds, row.irradiance_seconds, row.octree_seconds, row.write_seconds,
+        row.total_seconds, 1e6 * row.total_seconds / row.samples, row.peak_bytes / row.samples,
+        row.shadow_rays, row.bare_seconds, row.total_seconds / row.bare_seconds);
+  return text + "\n";
+}
+
+nlohmann::ordered_json bake_json(const std::vector<BakeRow>& rows) {
+  auto json = nlohmann::ordered_json::array();
+  for (const BakeRow& row : rows)
+    json.push_back({{"samples", row.samples},
+                    {"placement_seconds", row.placement_seconds},
+                    {"irradiance_seconds", row.irradiance_seconds},
+                    {"octree_seconds", row.octree_seconds},
+                    {"write_seconds", row.write_seconds},
+                    {"total_seconds", row.total_seconds},
+                    {"peak_bytes", row.peak_bytes},
+                    {"shadow_rays", row.shadow_rays},
+                    {"bare_seconds", row.bare_seconds}});
+  return json;
+}
+
 nlohmann::ordered_json case_json(const CaseRow& row) {
   nlohmann::ordered_json json{{"scene", row.scene},
                               {"view", row.view},
@@ -162,6 +193,7 @@ std::string format_markdown(const Results& results) {
     text += growth_table("Growth with the cache", results.by_samples, &GrowthRow::samples);
   if (!results.by_pixels.empty())
     text += growth_table("Growth with the picture", results.by_pixels, &GrowthRow::megapixels);
+  if (!results.bakes.empty()) text += bake_table(results.bakes);
   return text;
 }
 
@@ -183,6 +215,7 @@ std::string format_json(const Results& results) {
   for (const CaseRow& row : results.cases) json["cases"].push_back(case_json(row));
   json["growth"]["samples"] = growth_json(results.by_samples);
   json["growth"]["pixels"] = growth_json(results.by_pixels);
+  json["growth"]["bakes"] = bake_json(results.bakes);
   return json.dump(2) + "\n";
 }
 

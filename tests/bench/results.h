@@ -51,10 +51,22 @@ struct GrowthRow {
   double bake_peak_bytes = 0, render_peak_bytes = 0;  // resident, of the whole process
 };
 
+/// A bake by its stages. Shadow rays are the connections between samples and lights that face each other.
+struct BakeRow {
+  double samples = 0;
+  double placement_seconds = 0;  // area shares included
+  double irradiance_seconds = 0, octree_seconds = 0, write_seconds = 0;
+  double total_seconds = 0;
+  double peak_bytes = 0;  // resident, above what there was before
+  double shadow_rays = 0;
+  double bare_seconds = 0;  // of as many shadow rays in a plain loop
+};
+
 struct Results {
   std::vector<BareRow> bare;
   std::vector<CaseRow> cases;
   std::vector<GrowthRow> by_samples, by_pixels;
+  std::vector<BakeRow> bakes;
 };
 
 std::string format_markdown(const Results& results);

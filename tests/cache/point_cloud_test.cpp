@@ -85,7 +85,7 @@ TEST(PointCloud, OtherProgramsMayHaveSavedIt) {
       "property float eb\nproperty float eg\nproperty float er\nproperty float area\nproperty float nx\n"
       "property float ny\nproperty float nz\nproperty int group\nelement face 0\n"
       "property list uchar int vertex_indices\nend_header\n"
-      "3 255 1 2 0.3 0.2 0.1 0.5 0 0 1 1\n4 0 1.5 2 6 5 4 0.25 0 1 0 0\n";
+      "3 255 1 2 0.3 0.2 0.1 12.5 0 0 1 1\n4 0 1.5 2 6 5 4 3.5 0 1 0 0\n";
   write_file(folder.file("b.ply"), text);
   const Cache back = import_cloud(folder.file("b.ply"), &cache);
   EXPECT_EQ(back.fingerprint, cache.fingerprint);
@@ -95,7 +95,7 @@ TEST(PointCloud, OtherProgramsMayHaveSavedIt) {
   EXPECT_EQ(back.groups[1].position(0), Vec3(1, 2, 3));
   EXPECT_EQ(back.groups[1].irradiance(0), Rgb(0.1f, 0.2f, 0.3f));
   EXPECT_EQ(back.groups[0].normal(0), Vec3(0, 1, 0));
-  EXPECT_EQ(back.groups[0].area(0), 0.25f);
+  EXPECT_EQ(back.groups[0].area(0), 3.5f);
 
   export_cloud(cache, folder.file("a.ply"));
   std::string bytes = read_text_file(folder.file("a.ply"));
@@ -156,8 +156,68 @@ TEST(PointCloud, SaysWhatIsWrong) {
   EXPECT_TRUE(has(point("0 0 0 0 0 1 1 1 1 1 2"), "point 0 is of group 2; there are 2"));
   EXPECT_TRUE(has(point("0 0 0 0 0 1 1 1 1 1 0.5"), "group 0.5"));
   EXPECT_TRUE(has(point("nan 0 0 0 0 1 1 1 1 1 0"), "not a finite number"));
+  EXPECT_TRUE(has(point("0 0 0 0 0 1 1 1 1 1 -1"), "group -1;"));
   EXPECT_TRUE(has(point("0 0 0 0 0 1 1.000 1.000000"), "missing"));
+  EXPECT_TRUE(has(point("0 0 0 0 0 1 4 1 1 1 0 7"), "more numbers than the 11"));
+  EXPECT_TRUE(has(point("0 1e16 0 0 0 1 4 1 1 1 0"), "y of point 0 is 1e+16, more than 1e+15"));
+  EXPECT_TRUE(has(point("0 0 0 0 0 0 4 1 1 1 0"), "normal of point 0"));
+  EXPECT_TRUE(has(point("0 0 0 0 0 1 4 1 1 1 0\n0 0 0"), "6 bytes follow the last of the 1 points"));
+  EXPECT_TRUE(has(error_of(good + "x"), "1 bytes follow"));
+  // Of a binary file the group is an int.
+  std::string negative = good;
+  negative.replace(negative.size() - 4, 4, std::string(4, '\xff'));
+  EXPECT_TRUE(has(error_of(negative), "is of group -1;"));
   EXPECT_THROW(export_cloud(cache, folder.file("a.xyz")), Error);
+}
+
+// Two points of the group marble (4 units^2) and one of milk (12.566).
+std::string make_cloud(const std::string& first, const std::string& second) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex 3\n";
+  for (const char* column : {"x", "y", "z", "nx", "ny", "nz", "area", "er", "eg", "eb", "group"})
+    text += "property float " + std::string(column) + "\n";
+  return text + "end_header\n" + first + "\n" + second + "\n5 5 5 0 0 1 12.5 1 1 1 1\n\n";
+}
+
+TEST(PointCloud, IsHeldToItsSurface) {
+  const TemporaryFolder folder;
+  const Cache cache = make_cache();
+  const std::string path = folder.file("a.ply");
+  const auto refusal = [&](const std::string& first, const std::string& second) {
+    write_file(path, make_cloud(first, second));
+    try {
+      import_cloud(path, &cache);
+      return std::string();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kValue);
+      return error.reason();
+    }
+  };
+  const std::string tail = " 1 1 1 0";
+  // Areas up to a factor of 2.
+  for (const char* area : {"1.01", "2", "3.99"})
+    EXPECT_EQ(refusal("0 0 0 0 0 1 " + std::string(area) + tail, "1 0 0 0 0 1 " + std::string(area) + tail),
+              "");
+  for (const char* area : {"0.99", "4.01"})
+    EXPECT_NE(refusal("0 0 0 0 0 1 " + std::string(area) + tail, "1 0 0 0 0 1 " + std::string(area) + tail)
+                  .find("the areas of group \"marble\" add up"),
+              std::string::npos);
+  EXPECT_NE(refusal("0 0 0 0 0 1 2" + tail, "0 0 0 0 1 0 2" + tail)
+                .find("1 of the 2 points of group \"marble\" lie where others are"),
+            std::string::npos);
+}
+
+TEST(PointCloud, EndingsMayBeInUpperCase) {
+  const TemporaryFolder folder;
+  const Cache cache = make_cache();
+  for (const char* ending : {"ply", "csv"}) {
+    std::string upper = ending;
+    for (char& c : upper) c = static_cast<char>(c - 'a' + 'A');
+    export_cloud(cache, folder.file(std::string("a.") + ending));
+    export_cloud(cache, folder.file("b." + upper));
+    EXPECT_EQ(read_text_file(folder.file(std::string("a.") + ending)),
+              read_text_file(folder.file("b." + upper)));
+  }
+  EXPECT_EQ(import_cloud(folder.file("b.PLY")).sample_count(), cache.sample_count());
 }
 
 // Infinite power would not be a number in a picture.

@@ -100,6 +100,18 @@ TEST_F(Errors, Usage) {
   expect_refusal("bake s.xml -o c.nacre --points -5", 2, "points");
   expect_refusal("render s.xml -o a.exr -D sigma_a", 2, "name=value");
   expect_refusal("render s.xml -o a.exr --frobnicate", 2, "frobnicate");
+  for (const char* seed : {"-1", "''", "1.5", "18446744073709551616", "0x10"})
+    expect_refusal("bake s.xml -o c.nacre --seed " + std::string(seed), 2, "--seed");
+  expect_refusal("render s.xml -o a.exr --camera ''", 2, "--camera");
+  expect_refusal("render s.xml -o a.exr --height 0", 2, "--height goes with a mesh file");
+}
+
+// What stands where an interrupted bake would be kept is not replaced unless it is one.
+TEST_F(Errors, AnotherFileInThePlaceOfAnInterruptedBake) {
+  folder_.write("c.nacre.part", "my own notes");
+  expect_refusal("bake s.xml -o c.nacre --points 500", 1,
+                 "c.nacre.part: is not what an interrupted bake leaves");
+  EXPECT_EQ(read_file(folder_.file("c.nacre.part")), "my own notes");
 }
 
 }  // namespace

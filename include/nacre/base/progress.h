@@ -1,4 +1,5 @@
-// Progress of long stages: a bar with the time left on a terminal, plain lines elsewhere, or nothing.
+// Progress of long stages: a bar with the time left on a terminal, plain lines elsewhere, warnings alone, or
+// nothing.
 #pragma once
 
 #include <atomic>
@@ -10,7 +11,7 @@
 
 namespace nacre {
 
-enum class ProgressStyle { kSilent, kLines, kBar };
+enum class ProgressStyle { kSilent, kWarnings, kLines, kBar };
 
 /// Shared by the threads of one stage after another. Writes to standard error.
 class Progress {
@@ -22,10 +23,13 @@ class Progress {
   void advance(std::uint64_t units);
   /// Ends the stage with a line that says how long it took.
   void end();
-  /// One line of information, above the bar if there is one. Silent with kNone.
+  /// One line of information, above the bar if there is one. Silent with kSilent and kWarnings.
   void say(const std::string& line);
+  /// One line that begins with "nacre: warning: ". Silent with kSilent alone.
+  void warn(const std::string& line);
 
  private:
+  bool shows_progress() const { return style_ == ProgressStyle::kLines || style_ == ProgressStyle::kBar; }
   void print(bool final);
   ProgressStyle style_;
   std::string stage_, unit_;

@@ -16,8 +16,8 @@ void save_cache(const Cache& cache, const std::string& path);
 /// Maps a cache file and checks all of it: structure, checksums, links, and that every number is finite and
 /// in its range; nothing in the returned cache needs to be checked again. Throws Error with `path` or "path:
 /// byte N" as the place: kNotFound, kIo, kNotACache, kNewerVersion, kTruncated, kDamaged (naming the
-/// section).
-Cache load_cache(const std::string& path);
+/// section). `version`, if given, becomes that of the file's format.
+Cache load_cache(const std::string& path, std::uint32_t* version = nullptr);
 
 /// Whether a file begins like a cache. False for what cannot be read.
 bool is_cache_file(const std::string& path);

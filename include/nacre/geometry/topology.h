@@ -24,10 +24,13 @@ struct TopologyReport {
   // Copies of vertices that make the mesh an oriented manifold, which is all that OpenMesh (subdivision)
   // holds.
   std::uint64_t openmesh_added_vertices = 0;
-  double area = 0;    // scene units^2
-  double volume = 0;  // signed, scene units^3; meaningful when closed()
+  double area = 0;             // scene units^2
+  double volume = 0;           // signed, scene units^3; meaningful when closed()
+  Vec3d area_vector{0, 0, 0};  // sum of area times normal: 0 if closed
   Box3 box;
   bool closed() const { return boundary_edges == 0 && non_manifold_edges == 0; }
+  /// A surface whose borders span as much as it does, so that closing them makes no body of it.
+  bool is_sheet() const { return boundary_edges > 0 && area_vector.length() > 0.5 * area; }
 };
 
 TopologyReport analyse_topology(const Mesh& mesh);
@@ -35,5 +38,8 @@ TopologyReport analyse_topology(const Mesh& mesh);
 /// One line that names what matters for a translucent object ("open: 3 boundary loops ...; 12 degenerate
 /// triangles ..."; inside-out if closed with negative volume), or "" for a sound closed mesh.
 std::string describe_problems(const TopologyReport& report);
+
+/// What to do about its borders, as the end of that line: "; fillHoles closes holes", or "".
+std::string advise_on_borders(const TopologyReport& report);
 
 }  // namespace nacre

@@ -1,5 +1,5 @@
 // Where the diffusion model holds: scattering that dominates absorption, objects thicker than a few mean free
-// paths.
+// paths, surfaces that bound one body each.
 #pragma once
 
 #include "nacre/scene/scene.h"
@@ -19,5 +19,9 @@ MediumExtent measure_medium(const Scene& scene, std::size_t medium);
 /// One line for each medium with a channel of alpha' below 0.5, or with an extent thinner than four of its
 /// largest mean free path, naming its size in mm and in l'.
 Warnings check_validity(const Scene& scene);
+
+/// One line for each shape with pieces that are no boundary of their medium (find_faulty_pieces), saying what
+/// comes of it and what to do.
+Warnings check_bodies(const Scene& scene);
 
 }  // namespace nacre
