@@ -77,16 +77,17 @@ struct MonteCarloDiffusion::Impl {
   std::vector<Distribution> triangles;  // of each mesh, by area
   RadialDensity density;
 
-  Impl(const World& of_world, std::size_t medium, MonteCarloSampling how, int bounce_count)
+  Impl(const World& of_world, std::size_t medium, const Medium& material, MonteCarloSampling how,
+       int bounce_count)
       : world(of_world),
         sampling(how),
         bounces(bounce_count),
-        eta(of_world.scene->media[medium].eta()),
-        profiles(make_profiles(of_world.scene->media[medium])),
+        eta(material.eta()),
+        profiles(make_profiles(material)),
         world_meshes(shapes_of_medium(*of_world.scene, medium)),
         meshes(meshes_of(*of_world.scene, world_meshes)),
         tracer(meshes),
-        density(of_world.scene->media[medium], std::max(double{tracer.bounds().size().length()}, 1e-30)) {
+        density(material, std::max(double{tracer.bounds().size().length()}, 1e-30)) {
     std::vector<double> totals;
     for (const Mesh* mesh : meshes) {
       triangles.emplace_back(triangle_areas(*mesh));
@@ -166,9 +167,9 @@ struct MonteCarloDiffusion::Impl {
   }
 };
 
-MonteCarloDiffusion::MonteCarloDiffusion(const World& world, std::size_t medium, MonteCarloSampling sampling,
-                                         int bounces)
-    : impl_(std::make_unique<const Impl>(world, medium, sampling, bounces)) {}
+MonteCarloDiffusion::MonteCarloDiffusion(const World& world, std::size_t medium, const Medium& material,
+                                         MonteCarloSampling sampling, int bounces)
+    : impl_(std::make_unique<const Impl>(world, medium, material, sampling, bounces)) {}
 MonteCarloDiffusion::~MonteCarloDiffusion() = default;
 MonteCarloDiffusion::MonteCarloDiffusion(MonteCarloDiffusion&&) noexcept = default;
 

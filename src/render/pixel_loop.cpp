@@ -35,24 +35,25 @@ class StageClock {
 
 }  // namespace
 
-PixelLoop::PixelLoop(const World& world, const std::vector<Translucency>& media, const RenderParams& params)
+PixelLoop::PixelLoop(const World& world, std::span<const std::vector<Translucency>> variants,
+                     const RenderParams& params)
     : world_(world),
       params_(params),
       camera_(world.scene->cameras[params.camera], params.width, params.height),
       filter_(world.scene->films[params.camera]),
       light_samples_(world.scene->integrator.emitter_samples),
-      media_(media) {
+      variants_(variants) {
   const Integrator& integrator = world.scene->integrator;
   counts_mirrors_ = integrator.kind == IntegratorKind::kPath;
   depth_limit_ = !counts_mirrors_ ? 2 : integrator.max_depth < 0 ? kMaxWaves : integrator.max_depth;
   wave_limit_ = counts_mirrors_ ? std::min(depth_limit_, kMaxWaves) : kMaxDirectWaves;
 }
 
-void PixelLoop::render_tile(const Tile& tile, PixelBuffer& pixels, Totals& totals) const {
+void PixelLoop::render_tile(const Tile& tile, std::span<PixelBuffer> pictures, Totals& totals) const {
   std::vector<Path> paths, next;
   {
     const StageClock clock(totals.surface);
-    paths = start_paths(tile, pixels);
+    paths = start_paths(tile, pictures);
   }
   for (int wave = 0; wave < wave_limit_ && !paths.empty(); ++wave) {
     {
@@ -62,12 +63,12 @@ void PixelLoop::render_tile(const Tile& tile, PixelBuffer& pixels, Totals& total
     totals.rays += paths.size();
     if (wave == 0) {
       const StageClock clock(totals.surface);
-      record_first_hits(paths, pixels);
+      record_first_hits(paths, pictures);
     }
-    add_translucency(paths, wave, pixels, totals);
+    add_translucency(paths, wave, pictures, totals);
     const StageClock clock(totals.surface);
     next.clear();
-    for (const Path& path : paths) shade(path, wave, pixels, next);
+    for (const Path& path : paths) shade(path, wave, pictures, next);
     paths.swap(next);
   }
 }
@@ -98,7 +99,7 @@ Hit PixelLoop::first_hit(std::uint32_t pixel) const {
   return world_.tracer.intersect(camera_sample(pixel_start(pixel), 0).ray);
 }
 
-std::vector<PixelLoop::Path> PixelLoop::start_paths(const Tile& tile, PixelBuffer& pixels) const {
+std::vector<PixelLoop::Path> PixelLoop::start_paths(const Tile& tile, std::span<PixelBuffer> pictures) const {
   std::vector<Path> paths;
   paths.reserve(static_cast<std::size_t>(tile.width * tile.height) *
                 static_cast<std::size_t>(params_.samples_per_pixel));
@@ -115,7 +116,7 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(const Tile& tile, PixelBuffe
         // Of a few samples the weights might hardly add up to anything.
         const float weight = params_.samples_per_pixel < kLeastSignedSamples ? 1.0f : seen.weight;
         path.throughput = Rgb(weight);
-        pixels.weight[pixel] += weight;
+        for (PixelBuffer& pixels : pictures) pixels.weight[pixel] += weight;
         path.pixel = pixel;
         path.sample = sample;
         paths.push_back(path);
@@ -125,42 +126,40 @@ std::vector<PixelLoop::Path> PixelLoop::start_paths(const Tile& tile, PixelBuffe
   return paths;
 }
 
-void PixelLoop::record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const {
+void PixelLoop::record_first_hits(std::vector<Path>& paths, std::span<PixelBuffer> pictures) const {
   for (Path& path : paths) {
     if (!path.hit) continue;
     const std::size_t index = path.pixel;
-    pixels.coverage[index] += path.throughput.x;  // the weight of the filter
+    // The weight of the filter.
+    for (PixelBuffer& pixels : pictures) pixels.coverage[index] += path.throughput.x;
     if (path.sample != 0) continue;
     const SurfacePoint point = surface_point(world_, path.hit);
-    pixels.position[index] = point.position;
-    pixels.normal[index] = point.shading_normal;
-    pixels.depth[index] = path.hit.t;
-    pixels.object_id[index] = static_cast<float>(path.hit.mesh + 1);
     const int medium = world_.shape(path.hit).medium;
-    if (medium == kNone || (pixels.irradiance.empty() && pixels.irradiance_error.empty())) continue;
-    const BakedLight baked = media_[static_cast<std::size_t>(medium)].nearest_light(point);
-    if (!pixels.irradiance.empty()) pixels.irradiance[index] = baked.irradiance;
-    if (!pixels.irradiance_error.empty()) pixels.irradiance_error[index] = baked.error;
+    for (std::size_t v = 0; v < pictures.size(); ++v) {
+      PixelBuffer& pixels = pictures[v];
+      pixels.position[index] = point.position;
+      pixels.normal[index] = point.shading_normal;
+      pixels.depth[index] = path.hit.t;
+      pixels.object_id[index] = static_cast<float>(path.hit.mesh + 1);
+      if (medium == kNone || (pixels.irradiance.empty() && pixels.irradiance_error.empty())) continue;
+      const BakedLight baked = variants_[v][static_cast<std::size_t>(medium)].nearest_light(point);
+      if (!pixels.irradiance.empty()) pixels.irradiance[index] = baked.irradiance;
+      if (!pixels.irradiance_error.empty()) pixels.irradiance_error[index] = baked.error;
+    }
   }
 }
 
 // The points of one medium together, so that those near each other share their work.
-void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels,
+void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::span<PixelBuffer> pictures,
                                  Totals& totals) const {
   std::vector<const Path*> owners;
   std::vector<Hit> hits;
   std::vector<ExitPoint> points;
   std::vector<Rgb> radiance;
-  for (std::size_t m = 0; m < media_.size(); ++m) {
-    const Translucency& medium = media_[m];
+  for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
     owners.clear();
     hits.clear();
     points.clear();
-    const auto add = [&](Layer layer) {
-      for (std::size_t i = 0; i < owners.size(); ++i)
-        pixels.add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
-                   owners[i]->throughput * radiance[i]);
-    };
     {
       const StageClock clock(totals.surface);
       for (const Path& path : paths) {
@@ -173,34 +172,46 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, Pixel
              pixel_key(path.pixel, 200 + hash_words(static_cast<std::uint64_t>(wave), path.branch)),
              path.sample});
       }
-      radiance.assign(points.size(), Rgb(0, 0, 0));
       totals.shading_points += points.size();
     }
-    {
-      const StageClock clock(totals.diffusion);
-      std::uint64_t evaluations = 0;
-      medium.eval_diffusion(hits, points, radiance, evaluations);
-      totals.evaluations += evaluations;
+    for (std::size_t v = 0; v < pictures.size(); ++v) {
+      const Translucency& medium = variants_[v][m];
+      const auto add = [&](Layer layer) {
+        for (std::size_t i = 0; i < owners.size(); ++i)
+          pictures[v].add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
+                          owners[i]->throughput * radiance[i]);
+      };
+      radiance.assign(points.size(), Rgb(0, 0, 0));
+      {
+        const StageClock clock(totals.diffusion);
+        std::uint64_t evaluations = 0;
+        medium.eval_diffusion(hits, points, radiance, evaluations);
+        totals.evaluations += evaluations;
+      }
+      {
+        const StageClock clock(totals.surface);
+        for (std::size_t i = 0; i < points.size(); ++i) radiance[i] *= medium.exit_weight(points[i]);
+        add(Layer::kDiffusion);
+      }
+      if (!medium.has_single_scattering()) continue;
+      const StageClock clock(totals.single);
+      LostSamples lost;
+      for (std::size_t i = 0; i < points.size(); ++i)
+        radiance[i] = medium.estimate_single_scattering(points[i], lost);
+      add(Layer::kSingle);
+      totals.lost[m] += lost.lost;
+      totals.taken[m] += lost.taken;
     }
-    {
-      const StageClock clock(totals.surface);
-      for (std::size_t i = 0; i < points.size(); ++i) radiance[i] *= medium.exit_weight(points[i]);
-      add(Layer::kDiffusion);
-    }
-    if (!medium.has_single_scattering()) continue;
-    const StageClock clock(totals.single);
-    LostSamples lost;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      radiance[i] = medium.estimate_single_scattering(points[i], lost);
-    add(Layer::kSingle);
-    totals.lost[m] += lost.lost;
-    totals.taken[m] += lost.taken;
   }
 }
 
 // Adds what a path meets on surfaces, and follows it on.
-void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const {
-  pixels.add(path.layer, path.pixel, path.throughput * emitted_radiance(world_, path.ray, path.hit));
+void PixelLoop::shade(const Path& path, int wave, std::span<PixelBuffer> pictures,
+                      std::vector<Path>& next) const {
+  const auto add = [&](Layer layer, const Rgb& value) {
+    for (PixelBuffer& pixels : pictures) pixels.add(layer, path.pixel, value);
+  };
+  add(path.layer, path.throughput * emitted_radiance(world_, path.ray, path.hit));
   if (!path.hit || path.depth >= depth_limit_) return;
   ScatterPoint at = scatter_point(world_, path.hit, -path.ray.ray.direction);
   Bsdf& bsdf = at.surface.bsdf;
@@ -220,8 +231,7 @@ void PixelLoop::shade(const Path& path, int wave, PixelBuffer& pixels, std::vect
     bsdf.specular = false;
   }
   const int samples = path.scattered == 0 ? light_samples_ : 1;
-  pixels.add(layer, path.pixel,
-             path.throughput * reflect_direct_light(world_, at, samples, key,
+  add(layer, path.throughput * reflect_direct_light(world_, at, samples, key,
                                                     path.sample * static_cast<std::uint32_t>(samples),
                                                     Continuation::kGoesOn));
   follow(path, next_ray(world_, at, path.ray, samples, key, path.sample), layer, key, next);

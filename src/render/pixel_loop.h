@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <span>
 #include <vector>
 
 #include "nacre/base/report.h"
@@ -27,10 +28,12 @@ struct Tile {
 
 class PixelLoop {
  public:
-  /// `media` are parallel to Scene::media. All have to outlive it.
-  PixelLoop(const World& world, const std::vector<Translucency>& media, const RenderParams& params);
-  /// Adds the samples of the pixels of a tile.
-  void render_tile(const Tile& tile, PixelBuffer& pixels, Totals& totals) const;
+  /// `variants` of the scene differ in what its media are filled with, each parallel to Scene::media: they
+  /// share all rays, and what surfaces reflect. All have to outlive it.
+  PixelLoop(const World& world, std::span<const std::vector<Translucency>> variants,
+            const RenderParams& params);
+  /// Adds the samples of the pixels of a tile, to a buffer for each variant.
+  void render_tile(const Tile& tile, std::span<PixelBuffer> pictures, Totals& totals) const;
   /// What the first sample of a pixel sees.
   Hit first_hit(std::uint32_t pixel) const;
 
@@ -61,10 +64,11 @@ class PixelLoop {
   CameraSample camera_sample(const PixelStart& start, std::uint32_t sample) const;
   std::array<int, 2> place(std::uint32_t pixel) const;
   std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
-  std::vector<Path> start_paths(const Tile& tile, PixelBuffer& pixels) const;
-  void record_first_hits(std::vector<Path>& paths, PixelBuffer& pixels) const;
-  void add_translucency(const std::vector<Path>& paths, int wave, PixelBuffer& pixels, Totals& totals) const;
-  void shade(const Path& path, int wave, PixelBuffer& pixels, std::vector<Path>& next) const;
+  std::vector<Path> start_paths(const Tile& tile, std::span<PixelBuffer> pictures) const;
+  void record_first_hits(std::vector<Path>& paths, std::span<PixelBuffer> pictures) const;
+  void add_translucency(const std::vector<Path>& paths, int wave, std::span<PixelBuffer> pictures,
+                        Totals& totals) const;
+  void shade(const Path& path, int wave, std::span<PixelBuffer> pictures, std::vector<Path>& next) const;
   void follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,
               std::vector<Path>& next) const;
 
@@ -75,7 +79,7 @@ class PixelLoop {
   int light_samples_;
   int depth_limit_, wave_limit_;
   bool counts_mirrors_;  // whether mirrored and refracted edges count towards the limit
-  const std::vector<Translucency>& media_;
+  std::span<const std::vector<Translucency>> variants_;
 };
 
 }  // namespace nacre

@@ -53,17 +53,24 @@ RenderParams default_render_params(const Scene& scene, std::size_t camera) {
 }
 
 Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report)
+    : Renderer(world, cache, params, report, std::span(&world.scene->media, 1)) {}
+
+Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
+                   std::span<const std::vector<Medium>> variants)
     : world_(world) {
   const StageTimer timer(report, "diffusion");  // tables of profiles, nodes on surfaces
-  for (std::size_t m = 0; m < world.scene->media.size(); ++m)
-    media_.emplace_back(world, m, m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
+  for (const std::vector<Medium>& media : variants) {
+    std::vector<Translucency>& variant = variants_.emplace_back();
+    for (std::size_t m = 0; m < media.size(); ++m)
+      variant.emplace_back(world, m, media[m], m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
+  }
 }
 Renderer::~Renderer() = default;
 
 void Renderer::fill(Report& report) const {
   const StageTimer timer(report, "diffusion");
   std::uint64_t evaluations = 0;
-  for (const Translucency& medium : media_) medium.fill(evaluations);
+  for (const Translucency& medium : variants_[0]) medium.fill(evaluations);
   report.counts["kernel_evaluations"] += evaluations;
 }
 
@@ -71,16 +78,16 @@ void Renderer::load_exitance(const std::string& path) const {
   if (!std::filesystem::exists(path)) return;
   const std::vector<KeptExitance> file = nacre::load_exitance(path);
   std::vector<KeptExitance> own;
-  for (const Translucency& medium : media_) own.push_back(medium.keep());
+  for (const Translucency& medium : variants_[0]) own.push_back(medium.keep());
   check_exitance_keys(path, file, own);
-  for (std::size_t m = 0; m < media_.size(); ++m) media_[m].restore(file[m]);
+  for (std::size_t m = 0; m < variants_[0].size(); ++m) variants_[0][m].restore(file[m]);
 }
 
 bool Renderer::save_exitance(const std::string& path) const {
   std::vector<KeptExitance> own;
   std::vector<std::vector<std::uint32_t>> block_of;
   bool any = false;
-  for (const Translucency& medium : media_) {
+  for (const Translucency& medium : variants_[0]) {
     own.push_back(medium.keep());
     block_of.push_back(medium.block_of_node());
     any = any || !own.back().key.empty();
@@ -91,7 +98,7 @@ bool Renderer::save_exitance(const std::string& path) const {
 
 std::size_t Renderer::filled_node_count() const {
   std::size_t count = 0;
-  for (const Translucency& medium : media_) count += medium.filled_node_count();
+  for (const Translucency& medium : variants_[0]) count += medium.filled_node_count();
   return count;
 }
 
@@ -102,17 +109,29 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
 
 Image Renderer::render(const RenderParams& params, Progress& progress, Report& report,
                        Warnings& warnings) const {
-  PixelBuffer pixels(params.crop_width, params.crop_height, params.aovs);
-  Totals totals(media_.size());
+  return std::move(render_pictures(1, params, progress, report, warnings)[0]);
+}
+
+std::vector<Image> Renderer::render_variants(const RenderParams& params, Progress& progress, Report& report,
+                                             Warnings& warnings) const {
+  return render_pictures(variants_.size(), params, progress, report, warnings);
+}
+
+// Of the first `count` variants.
+std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderParams& params,
+                                             Progress& progress, Report& report, Warnings& warnings) const {
+  const auto variants = std::span(variants_).first(count);
+  std::vector<PixelBuffer> pictures(count, PixelBuffer(params.crop_width, params.crop_height, params.aovs));
+  Totals totals(world_.scene->media.size());
   const Stopwatch watch;
-  const PixelLoop loop(world_, media_, params);
+  const PixelLoop loop(world_, variants, params);
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
   const std::vector<Tile> tiles = make_tiles(params);
   progress.begin("rendering", "pixels", pixel_count);
   parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      loop.render_tile(tiles[i], pixels, totals);
+      loop.render_tile(tiles[i], pictures, totals);
       progress.advance(static_cast<std::size_t>(tiles[i].width * tiles[i].height));
     }
   });
@@ -131,15 +150,17 @@ Image Renderer::render(const RenderParams& params, Progress& progress, Report& r
   report.counts["rays"] += totals.rays;
   report.counts["shading_points"] += totals.shading_points;
   report.counts["kernel_evaluations"] += totals.evaluations;
-  for (std::size_t m = 0; m < media_.size(); ++m)
-    report.notes["diffusion of " + medium_label(*world_.scene, m)] = media_[m].describe_path();
+  for (std::size_t m = 0; m < world_.scene->media.size(); ++m)
+    report.notes["diffusion of " + medium_label(*world_.scene, m)] = variants[0][m].describe_path();
   for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
-  return pixels.make_image(params);
+  std::vector<Image> images;
+  for (const PixelBuffer& pixels : pictures) images.push_back(pixels.make_image(params));
+  return images;
 }
 
 Verification Renderer::verify(const RenderParams& params, int count) const {
-  const PixelLoop loop(world_, media_, params);
+  const PixelLoop loop(world_, variants_, params);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(params.crop_width) * static_cast<std::uint64_t>(params.crop_height);
   const auto wanted = static_cast<std::size_t>(count);
@@ -154,7 +175,7 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
   std::vector<Rgb> values(hits.size()), exact(hits.size());
   parallel_for(hits.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      media_[static_cast<std::size_t>(world_.shape(hits[i]).medium)].eval_exitance(
+      variants_[0][static_cast<std::size_t>(world_.shape(hits[i]).medium)].eval_exitance(
           std::span(hits).subspan(i, 1), std::span(values).subspan(i, 1), std::span(exact).subspan(i, 1));
   });
   const auto as_image = [](const std::vector<Rgb>& radiances) {

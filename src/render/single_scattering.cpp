@@ -113,8 +113,7 @@ struct SingleScattering::Impl {
   }
 };
 
-SingleScattering::SingleScattering(const World& world, std::size_t medium) {
-  const Medium& m = world.scene->media[medium];
+SingleScattering::SingleScattering(const World& world, std::size_t medium, const Medium& m) {
   impl_ = std::make_unique<const Impl>(Impl{world, Interior(world, medium), m.sigma_s * m.scale,
                                             (m.sigma_s + m.sigma_a) * m.scale, m.g, m.eta(),
                                             m.convention == Convention::kConserving});

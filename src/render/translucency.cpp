@@ -16,13 +16,14 @@ enum Purpose : std::uint64_t { kMonteCarloPoints = 11, kLambertLight, kSinglePoi
 
 }  // namespace
 
-Translucency::Translucency(const World& world, std::size_t medium, const CacheGroup* group,
-                           const RenderParams& params)
+Translucency::Translucency(const World& world, std::size_t medium, const Medium& material,
+                           const CacheGroup* group, const RenderParams& params)
     : world_(world),
       medium_(medium),
-      method_(world.scene->media[medium].lambert ? Method::kLambert : params.method),
-      eta_(world.scene->media[medium].eta()),
-      exit_factor_(exit_factor(world.scene->media[medium])),
+      material_(material),
+      method_(material.lambert ? Method::kLambert : params.method),
+      eta_(material.eta()),
+      exit_factor_(exit_factor(material)),
       bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
       light_samples_(world.scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
@@ -30,7 +31,7 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
       tolerance_(params.tolerance),
       certified_(params.certified),
       group_(group) {
-  const Medium& m = world.scene->media[medium];
+  const Medium& m = material_;
   const auto profiles = make_profiles(m);
   for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_)) {
@@ -41,16 +42,16 @@ Translucency::Translucency(const World& world, std::size_t medium, const CacheGr
     if (method_ == Method::kHierarchical && params.tolerance > 0 && !params.certified)
       make_field(*group, params.tolerance);
   } else if (method_ == Method::kMonteCarlo)
-    monte_carlo_.emplace(world, medium, params.mc_sampling, bounces_);
+    monte_carlo_.emplace(world, medium, m, params.mc_sampling, bounces_);
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
   if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
-    single_.emplace(world, medium);
+    single_.emplace(world, medium, m);
 }
 
 // Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
 // so many mean free paths that nodes would fill the memory, pixels are fewer.
 void Translucency::make_field(const CacheGroup& group, double tolerance) {
-  const Medium& m = world_.scene->media[medium_];
+  const Medium& m = material_;
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
@@ -81,7 +82,7 @@ std::string Translucency::describe_path() const {
 
 // All that M_o depends on, by name.
 KeyValues Translucency::make_key() const {
-  const Medium& m = world_.scene->media[medium_];
+  const Medium& m = material_;
   const auto triple = [](const Rgb& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
   const std::string label = medium_label(*world_.scene, medium_);
   KeyValues key{{"samples", samples_digest(*group_)},

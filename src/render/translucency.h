@@ -33,8 +33,10 @@ struct BakedLight {
 
 class Translucency {
  public:
-  /// `group` is read where the method needs it, else it may be nullptr.
-  Translucency(const World& world, std::size_t medium, const CacheGroup* group, const RenderParams& params);
+  /// A medium of the scene filled with `material`, which has the eta of the scene's. `group` is read where
+  /// the method needs it, else it may be nullptr.
+  Translucency(const World& world, std::size_t medium, const Medium& material, const CacheGroup* group,
+               const RenderParams& params);
 
   /// Diffuse exitance M_o at points that should lie near each other; `hits` are theirs, side by side. Adds to
   /// `evaluations` those of the profile.
@@ -71,6 +73,7 @@ class Translucency {
 
   const World& world_;
   std::size_t medium_;
+  Medium material_;
   Method method_;
   float eta_;
   float exit_factor_;

@@ -17,8 +17,10 @@ enum class MonteCarloSampling { kUniform, kExponential };
 /// Diffuse exitance M_o of one medium by sampling its surface and the irradiance there.
 class MonteCarloDiffusion {
  public:
-  /// `bounces` of light off opaque surfaces before it enters, as in a bake. The world has to outlive it.
-  MonteCarloDiffusion(const World& world, std::size_t medium, MonteCarloSampling sampling, int bounces);
+  /// Of a medium of the scene filled with `material`, whose eta is the scene's; `bounces` of light off opaque
+  /// surfaces before it enters, as in a bake. The world has to outlive it.
+  MonteCarloDiffusion(const World& world, std::size_t medium, const Medium& material,
+                      MonteCarloSampling sampling, int bounces);
   ~MonteCarloDiffusion();
   MonteCarloDiffusion(MonteCarloDiffusion&&) noexcept;
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,10 @@ class Renderer {
   /// `cache` holds a group for each medium of the scene where the method uses one; world and cache have to
   /// outlive it. Of `params` it takes the method, its tolerance, samples and bounces; pictures have the same.
   Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report);
+  /// The same for several `variants` of the scene, which differ in what fills its media: each is parallel to
+  /// Scene::media and has their etas. What is kept, verified and rendered singly is the first.
+  Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
+           std::span<const std::vector<Medium>> variants);
   ~Renderer();
 
   /// Evaluates diffusion on the whole surface, so that every picture after it finds it there; nothing where
@@ -87,14 +92,20 @@ class Renderer {
   /// `single` and `specular` of translucent objects, `surface` of all others, means over the pixel's samples;
   /// R G B is their sum. Adds to `warnings` a line for each medium with samples that found no way out of it.
   Image render(const RenderParams& params, Progress& progress, Report& report, Warnings& warnings) const;
+  /// A picture of each variant, the same to the bit as by itself; rays, and what surfaces reflect, are traced
+  /// once for all of them.
+  std::vector<Image> render_variants(const RenderParams& params, Progress& progress, Report& report,
+                                     Warnings& warnings) const;
 
   /// Measures the error of kHierarchical at what the first samples of `count` random pixels see that show a
   /// translucent surface; at fewer, perhaps none, where those are less than about one in a hundred.
   Verification verify(const RenderParams& params, int count) const;
 
  private:
+  std::vector<Image> render_pictures(std::size_t count, const RenderParams& params, Progress& progress,
+                                     Report& report, Warnings& warnings) const;
   const World& world_;
-  std::vector<Translucency> media_;  // parallel to Scene::media
+  std::vector<std::vector<Translucency>> variants_;  // each parallel to Scene::media
 };
 
 /// A single picture.

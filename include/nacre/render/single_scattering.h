@@ -18,8 +18,8 @@ struct LostSamples {
 /// cos(theta_i')), so that radiance is conserved at the entry.
 class SingleScattering {
  public:
-  /// The world has to outlive it.
-  SingleScattering(const World& world, std::size_t medium);
+  /// Of a medium of the scene filled with `material`, whose eta is the scene's. The world has to outlive it.
+  SingleScattering(const World& world, std::size_t medium, const Medium& material);
   ~SingleScattering();
   SingleScattering(SingleScattering&&) noexcept;
 
