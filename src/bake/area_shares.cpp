@@ -23,16 +23,25 @@ std::vector<float> exchange_areas(const PointBlocks& blocks, std::span<const Pla
   std::vector<float> shares(cells.areas.size());
   const float scale = 1 / square(kExchangeReach * spacing);
   blocks.for_each_block([&](const BlockNeighbourhood& near) {
+    const BlockNeighbourhood::Entries& entries = near.entries();
+    // Cells that take no part have no area here.
+    std::vector<float> areas(entries.size());
+    for (std::size_t e = 0; e < areas.size(); ++e)
+      areas[e] = cells.closed[entries.indices[e]] ? cells.areas[entries.indices[e]] : 0.0f;
     for (const std::uint32_t i : near.own()) {
       const PlacedPoint& point = points[i];
+      const float own = cells.areas[i];
       float gain = 0;
       if (cells.closed[i])
-        near.for_each_near(point.position, [&](const BlockNeighbourhood::Entry& entry) {
-          const float q = 1 - (entry.position - point.position).length2() * scale;
-          if (q > 0 && cells.closed[entry.index] && dot(entry.normal, point.normal) > kSameSheetCosine)
-            gain += square(q) * (cells.areas[i] - cells.areas[entry.index]);
+        near.for_each_range_near(point.position, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t e = begin; e < end; ++e) {
+            // Without a branch for each.
+            const float q = std::max(1 - (entries.position(e) - point.position).length2() * scale, 0.0f);
+            const bool counts = (areas[e] > 0) & (dot(entries.normal(e), point.normal) > kSameSheetCosine);
+            gain += counts ? square(q) * (own - areas[e]) : 0.0f;
+          }
         });
-      shares[i] = std::max(cells.areas[i] + kExchange * gain, kLeastShare * cells.areas[i]);
+      shares[i] = std::max(own + kExchange * gain, kLeastShare * own);
     }
   });
   return shares;

@@ -17,8 +17,8 @@ namespace {
 // Smallest distance over the hexagonal spacing of the target. With this many candidates per point about as
 // many darts stick as are asked for (measured); more candidates would allow a larger ratio, up to 0.777 at
 // saturation.
-constexpr double kRelativeRadius = 0.715;
-constexpr double kCandidates = 13;
+constexpr double kRelativeRadius = 0.711;
+constexpr double kCandidates = 12;
 // At most so many per point at once, for the memory that they take.
 constexpr double kCandidatesAtOnce = 4;
 constexpr double kFewestCandidates = 256;
