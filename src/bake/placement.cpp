@@ -226,10 +226,8 @@ class DartThrower {
         Scratch scratch{LocalGrid(normals_, radius_), {}, {}, {}};
         for (std::size_t i = begin; i < end; ++i) {
           const std::uint32_t bucket = first + static_cast<std::uint32_t>(i);
-          scratch.darts.clear();
-          for (const std::uint32_t c : candidates.of(bucket))
-            scratch.darts.push_back(stream.make(c, triangles[c]));
-          throw_into_bucket(bucket, hash_words(key, bucket), scratch);
+          make_darts(stream, candidates.of(bucket), triangles, hash_words(key, bucket), scratch.darts);
+          throw_into_bucket(bucket, scratch);
         }
       });
     }
@@ -274,13 +272,22 @@ class DartThrower {
     std::vector<std::uint64_t> blocks;
   };
 
-  void throw_into_bucket(std::uint32_t bucket, std::uint64_t key, Scratch& scratch) {
-    if (scratch.darts.empty()) return;
-    // Candidates come triangle by triangle, darts have to fly in no order.
+  // Candidates come triangle by triangle, darts have to fly in no order: each takes the place of any that was
+  // made before it, or its own.
+  static void make_darts(const CandidateStream& stream, std::span<const std::uint32_t> candidates,
+                         std::span<const std::uint32_t> triangles, std::uint64_t key,
+                         std::vector<Point>& darts) {
+    darts.resize(candidates.size());
     Rng rng(key);
-    for (std::size_t i = scratch.darts.size(); i > 1; --i)
-      std::swap(scratch.darts[i - 1],
-                scratch.darts[static_cast<std::size_t>((rng.next_bits() >> 32) * i >> 32)]);
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const auto other = static_cast<std::size_t>((rng.next_bits() >> 32) * (i + 1) >> 32);
+      darts[i] = darts[other];
+      darts[other] = stream.make(candidates[i], triangles[candidates[i]]);
+    }
+  }
+
+  void throw_into_bucket(std::uint32_t bucket, Scratch& scratch) {
+    if (scratch.darts.empty()) return;
     scratch.blocks.clear();
     for (const Point& dart : scratch.darts) {
       const std::uint64_t block = SpaceBlocks::key(blocks_.at(dart.position));

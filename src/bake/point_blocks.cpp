@@ -74,8 +74,8 @@ void BlockNeighbourhood::sort_entries(std::span<const PlacedPoint> points) {
   for (const std::uint16_t cell : cells_) ++begins_[cell + 1u];
   for (std::size_t c = 1; c < begins_.size(); ++c) begins_[c] += begins_[c - 1];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    entries_.positions[axis].resize(unsorted_.size());
-    entries_.normals[axis].resize(unsorted_.size());
+    entries_.positions[axis].resize(unsorted_.size() + kLanes - 1);
+    entries_.normals[axis].resize(unsorted_.size() + kLanes - 1);
   }
   entries_.indices.resize(unsorted_.size());
   // From the back, so that begins end up where they belong without a copy.

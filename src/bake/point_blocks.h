@@ -12,7 +12,9 @@ namespace nacre {
 /// The points in one block and those within one cell of it, in a dense grid.
 class BlockNeighbourhood {
  public:
-  /// Everything about the points, cell by cell, in arrays of their own.
+  static constexpr std::size_t kLanes = 4;
+  /// Everything about the points, cell by cell, in arrays of their own, where kLanes values can be read from
+  /// any entry on.
   struct Entries {
     std::array<std::vector<float>, 3> positions, normals;
     std::vector<std::uint32_t> indices;  // of the points

@@ -114,6 +114,7 @@ class CellCutter {
     const BlockNeighbourhood::Entries& entries = near.entries();
     // Their squared distances, of which as floats above 0 the bits are in order, and which entries they are.
     std::vector<std::uint64_t> neighbours(entries.size() + 1);
+    std::vector<float> distances2(entries.size());
     const float reach2 = square(kCellReach * spacing_);
     for (const std::uint32_t i : near.own()) {
       const PlacedPoint& point = points_[i];
@@ -126,11 +127,13 @@ class CellCutter {
         if (4 * cell.radius2() <= done2) break;
         std::size_t count = 0;
         near.for_each_range_near(point.position, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t e = begin; e < end; ++e)
+            distances2[e - begin] = (entries.position(e) - point.position).length2();
           for (std::size_t e = begin; e < end; ++e) {
-            const float distance2 = (entries.position(e) - point.position).length2();
-            // Without a branch for each.
+            // Without a branch for each. The point itself, at no distance, will cut nothing.
+            const float distance2 = distances2[e - begin];
             neighbours[count] = std::uint64_t{std::bit_cast<std::uint32_t>(distance2)} << 32 | e;
-            count += (distance2 < within2) & (distance2 >= done2) & (entries.indices[e] != i);
+            count += (distance2 < within2) & (distance2 >= done2);
           }
         });
         std::sort(neighbours.begin(), neighbours.begin() + static_cast<std::ptrdiff_t>(count));
