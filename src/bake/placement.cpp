@@ -20,10 +20,10 @@ namespace {
 constexpr double kRelativeRadius = 0.711;
 constexpr double kCandidates = 12;
 // At most so many per point at once, for the memory that they take.
-constexpr double kCandidatesAtOnce = 4;
+constexpr double kCandidatesAtOnce = 5;
 constexpr double kFewestCandidates = 256;
 
-constexpr int kBlockCells = 8;  // cells along a block's side, each two radii wide
+constexpr int kBlockCells = 12;  // cells along a block's side, each two radii wide
 constexpr float kBlockRadii = 2.0f * kBlockCells;
 
 struct Point {
