@@ -1,4 +1,6 @@
 // nacre bake: a scene's irradiance into a cache file.
+#include <malloc.h>
+
 #include <filesystem>
 
 #include "cached_light.h"
@@ -27,6 +29,9 @@ std::string journal_path(const std::string& output) {
 }
 
 void run(const Options& options, const std::string& command_line) {
+  // Arrays of samples are gone for good when they are given back, and a bake is as large as all of them: not
+  // what the program keeps otherwise.
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
   Session session(options.common, command_line);
   check_writable(options.output, {options.scene.path});
   std::optional<Cache> old;

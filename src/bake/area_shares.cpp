@@ -1,6 +1,8 @@
 // Exchange between Voronoi cells, and scaling.
 #include "bake/area_shares.h"
 
+#include <cstring>
+
 #include "bake/voronoi_cells.h"
 #include "nacre/cache/cache.h"
 
@@ -16,6 +18,17 @@ constexpr float kExchangeReach = 1.6f;  // spacings
 // No share is smaller than this part of its cell, where cells differ more than those of even samples do.
 constexpr float kLeastShare = 0.125f;
 
+// A few entries at once; arrays have room for lanes beyond their end.
+constexpr std::size_t kLanes = BlockNeighbourhood::kLanes;
+using Lanes [[gnu::vector_size(4 * kLanes)]] = float;
+using LaneNumbers [[gnu::vector_size(4 * kLanes)]] = int;
+constexpr LaneNumbers kLaneNumbers{0, 1, 2, 3};
+Lanes load_lanes(const float* values) {
+  Lanes lanes;
+  std::memcpy(&lanes, values, sizeof lanes);
+  return lanes;
+}
+
 // What one gains the other loses, so that sums stay. Cells at borders are small because they are cut, and
 // take no part.
 std::vector<float> exchange_areas(const PointBlocks& blocks, std::span<const PlacedPoint> points,
@@ -23,16 +36,31 @@ std::vector<float> exchange_areas(const PointBlocks& blocks, std::span<const Pla
   std::vector<float> shares(cells.areas.size());
   const float scale = 1 / square(kExchangeReach * spacing);
   blocks.for_each_block([&](const BlockNeighbourhood& near) {
+    const BlockNeighbourhood::Entries& entries = near.entries();
+    // Cells that take no part have no area here.
+    std::vector<float> areas(entries.size() + kLanes - 1);
+    for (std::size_t e = 0; e < entries.size(); ++e)
+      areas[e] = cells.closed[entries.indices[e]] ? cells.areas[entries.indices[e]] : 0.0f;
     for (const std::uint32_t i : near.own()) {
-      const PlacedPoint& point = points[i];
-      float gain = 0;
+      const float own = cells.areas[i];
+      const Vec3 &p = points[i].position, &n = points[i].normal;
+      Lanes gains{};
       if (cells.closed[i])
-        near.for_each_near(point.position, [&](const BlockNeighbourhood::Entry& entry) {
-          const float q = 1 - (entry.position - point.position).length2() * scale;
-          if (q > 0 && cells.closed[entry.index] && dot(entry.normal, point.normal) > kSameSheetCosine)
-            gain += square(q) * (cells.areas[i] - cells.areas[entry.index]);
+        near.for_each_range_near(p, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t e = begin; e < end; e += kLanes) {
+            const auto lanes = [e](const std::vector<float>& values) { return load_lanes(&values[e]); };
+            const auto& [x, y, z] = entries.positions;
+            const auto& [normal_x, normal_y, normal_z] = entries.normals;
+            const Lanes dx = lanes(x) - p.x, dy = lanes(y) - p.y, dz = lanes(z) - p.z;
+            const Lanes q = 1 - (dx * dx + dy * dy + dz * dz) * scale, area = lanes(areas);
+            const Lanes cosine = lanes(normal_x) * n.x + lanes(normal_y) * n.y + lanes(normal_z) * n.z;
+            const auto counts = (q > 0) & (area > 0) & (cosine > kSameSheetCosine) &
+                                (kLaneNumbers < static_cast<int>(end - e));
+            gains += counts ? q * q * (own - area) : Lanes{};
+          }
         });
-      shares[i] = std::max(cells.areas[i] + kExchange * gain, kLeastShare * cells.areas[i]);
+      const float gain = gains[0] + gains[1] + gains[2] + gains[3];
+      shares[i] = std::max(own + kExchange * gain, kLeastShare * own);
     }
   });
   return shares;

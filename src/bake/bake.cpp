@@ -100,9 +100,24 @@ std::vector<Rgb> entry_albedos(const World& world, std::size_t medium, std::span
   return albedos;
 }
 
+// In the order of the octree: neighbours are computed one after the other, and nothing has to be sorted
+// later.
+std::vector<PlacedPoint> place_in_order(const GroupSurface& surface, double target, std::uint64_t seed,
+                                        Progress& progress) {
+  const std::vector<PlacedPoint> placed = place_points(surface, target, seed, progress);
+  std::vector<Vec3> positions(placed.size());
+  std::ranges::transform(placed, positions.begin(), &PlacedPoint::position);
+  const std::vector<std::uint32_t> order = octree_order(positions);
+  std::vector<PlacedPoint> sorted(placed.size());
+  parallel_for(placed.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) sorted[i] = placed[order[i]];
+  });
+  return sorted;
+}
+
 PlacedSamples place_samples(const World& world, std::size_t medium, const GroupSurface& surface,
                             double points, std::uint64_t seed, Progress& progress) {
-  const std::vector<PlacedPoint> placed = place_points(surface, points, seed, progress);
+  const std::vector<PlacedPoint> placed = place_in_order(surface, points, seed, progress);
   PlacedSamples result;
   result.samples.areas = compute_area_shares(surface, placed, progress);
   limit_shares(surface, placed, result.samples.areas);

@@ -17,13 +17,13 @@ namespace {
 // Smallest distance over the hexagonal spacing of the target. With this many candidates per point about as
 // many darts stick as are asked for (measured); more candidates would allow a larger ratio, up to 0.777 at
 // saturation.
-constexpr double kRelativeRadius = 0.715;
-constexpr double kCandidates = 13;
+constexpr double kRelativeRadius = 0.711;
+constexpr double kCandidates = 12;
 // At most so many per point at once, for the memory that they take.
-constexpr double kCandidatesAtOnce = 6;
+constexpr double kCandidatesAtOnce = 5;
 constexpr double kFewestCandidates = 256;
 
-constexpr int kBlockCells = 8;  // cells along a block's side, each two radii wide
+constexpr int kBlockCells = 12;  // cells along a block's side, each two radii wide
 constexpr float kBlockRadii = 2.0f * kBlockCells;
 
 struct Point {
@@ -31,7 +31,8 @@ struct Point {
   std::uint32_t triangle;
 };
 
-// Points in the order of strata of area: point i is a function of seed and round alone, cheap to make again.
+// Points in the order of strata of area: point i is a function of seed and round alone, cheap to make again
+// where its triangle is known.
 class CandidateStream {
  public:
   CandidateStream(const GroupSurface& surface, std::uint64_t key, std::size_t count)
@@ -41,25 +42,27 @@ class CandidateStream {
         stratum_(surface.areas.total() / static_cast<double>(count)),
         last_(std::nextafter(surface.areas.total(), 0.0)) {}
 
-  /// Ascending i, from one call to the next.
-  Point make(std::size_t i) {
+  /// The triangle of point i; ascending i, from one call to the next.
+  std::uint32_t find_triangle(std::size_t i) {
     Rng rng(key_ + 2 * i * Rng::kStep);  // the i-th pair of one sequence
-    find_triangle(std::min((static_cast<double>(i) + rng.next_double()) * stratum_, last_));
-    const std::uint64_t bits = rng.next_bits();
+    find_triangle_at(std::min((static_cast<double>(i) + rng.next_double()) * stratum_, last_));
+    return static_cast<std::uint32_t>(triangle_);
+  }
+  Point make(std::size_t i, std::uint32_t triangle) const {
+    const std::uint64_t bits = Rng(key_ + (2 * i + 1) * Rng::kStep).next_bits();
     // A parallelogram folded into the triangle.
     const float u = to_unit_float(static_cast<std::uint32_t>(bits >> 32));
     const float v = to_unit_float(static_cast<std::uint32_t>(bits));
     const float b = u + v > 1 ? 1 - u : u, c = u + v > 1 ? 1 - v : v;
-    const Triangle& t = surface_.triangles[triangle_];
+    const Triangle& t = surface_.triangles[triangle];
     const Vec3& p0 = surface_.positions[t[0]];
-    return {p0 + (surface_.positions[t[1]] - p0) * b + (surface_.positions[t[2]] - p0) * c,
-            static_cast<std::uint32_t>(triangle_)};
+    return {p0 + (surface_.positions[t[1]] - p0) * b + (surface_.positions[t[2]] - p0) * c, triangle};
   }
 
  private:
   // The first triangle whose cumulative area is above x, never one without area; in steps that double, since
   // it is mostly near the last.
-  void find_triangle(double x) {
+  void find_triangle_at(double x) {
     if (cumulative_[triangle_] > x) return;
     std::size_t low = triangle_ + 1, step = 1;
     while (low + step < cumulative_.size() && cumulative_[low + step - 1] <= x) {
@@ -91,10 +94,18 @@ class LocalGrid {
     first_.fill(-1);
     slots_.clear();
   }
+  /// Whether a point of the block matters to any of its neighbours.
+  bool is_near_side(const Point& point) const {
+    const Vec3 at = (point.position - corner_) * inverse_;
+    constexpr float kWider = kMargin + 0.01f;
+    bool inside = true;
+    for (int axis = 0; axis < 3; ++axis)
+      inside &= (at[axis] > kWider) & (at[axis] < static_cast<float>(kBlockCells) - kWider);
+    return !inside;
+  }
   /// Adds a point of the block or of a neighbour, unless it is too far away to matter.
   void add(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
-    constexpr float kMargin = 0.51f;  // a radius, and what rounding may add
     // Without a branch for each: which of them decides is anyone's guess.
     bool within = true;
     for (int axis = 0; axis < 3; ++axis)
@@ -122,6 +133,7 @@ class LocalGrid {
 
  private:
   static constexpr int kSide = kBlockCells + 2;
+  static constexpr float kMargin = 0.51f;  // a radius, and what rounding may add
   static constexpr std::size_t kLanes = 4;
   using Lanes [[gnu::vector_size(4 * kLanes)]] = float;
   // A few points of a cell, tested at once; those that are not there are infinitely far away.
@@ -197,19 +209,25 @@ class DartThrower {
   }
 
   void throw_round(std::uint64_t round, std::size_t count) {
+    const std::uint64_t key = hash_words(seed_, round);
+    std::vector<std::uint32_t> triangles(count);
     const Buckets candidates = sort_into_buckets(
         count, blocks_.bucket_count(), [&](std::size_t begin, std::size_t end, const auto& emit) {
-          CandidateStream stream(surface_, hash_words(seed_, round), count);
-          for (std::size_t i = begin; i < end; ++i)
-            emit(i, blocks_.bucket(blocks_.at(stream.make(i).position)));
+          CandidateStream stream(surface_, key, count);
+          for (std::size_t i = begin; i < end; ++i) {
+            triangles[i] = stream.find_triangle(i);
+            emit(i, blocks_.bucket(blocks_.at(stream.make(i, triangles[i]).position)));
+          }
         });
     for (std::uint32_t phase = 0; phase < SpaceBlocks::kPhases; ++phase) {
       const std::uint32_t first = phase * blocks_.buckets_per_phase();
       parallel_for(blocks_.buckets_per_phase(), 8, [&](std::size_t begin, std::size_t end) {
-        Scratch scratch{LocalGrid(normals_, radius_), {}, {}};
+        const CandidateStream stream(surface_, key, count);
+        Scratch scratch{LocalGrid(normals_, radius_), {}, {}, {}};
         for (std::size_t i = begin; i < end; ++i) {
           const std::uint32_t bucket = first + static_cast<std::uint32_t>(i);
-          throw_into_bucket(bucket, candidates.of(bucket), round, count, scratch);
+          make_darts(stream, candidates.of(bucket), triangles, hash_words(key, bucket), scratch.darts);
+          throw_into_bucket(bucket, scratch);
         }
       });
     }
@@ -217,7 +235,7 @@ class DartThrower {
 
   std::size_t count() const {
     std::size_t sum = 0;
-    for (const auto& bucket : points_) sum += bucket.size();
+    for (const Bucket& bucket : points_) sum += bucket.points.size();
     return sum;
   }
 
@@ -226,15 +244,15 @@ class DartThrower {
     std::size_t sum = 0;
     for (std::size_t b = 0; b < points_.size(); ++b) {
       begins[b] = sum;
-      sum += points_[b].size();
+      sum += points_[b].points.size();
     }
     std::vector<PlacedPoint> placed(sum);
     parallel_for(points_.size(), 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t b = begin; b < end; ++b) {
         std::size_t at = begins[b];
-        for (const Point& point : points_[b])
+        for (const Point& point : points_[b].points)
           placed[at++] = {point.position, point.triangle, normals_[point.triangle]};
-        std::vector<Point>().swap(points_[b]);
+        std::vector<Point>().swap(points_[b].points);
       }
     });
     // Many small pieces of memory, which the allocator would keep for ever.
@@ -243,63 +261,70 @@ class DartThrower {
   }
 
  private:
-  struct Dart {
-    std::uint64_t block;
-    Point point;
+  // The points in a bucket, those near the sides of their blocks first.
+  struct Bucket {
+    std::vector<Point> points;
+    std::size_t near_sides = 0;
   };
   struct Scratch {
     LocalGrid grid;
-    std::vector<Dart> darts;
-    std::vector<Point> stuck;
+    std::vector<Point> darts, stuck;
+    std::vector<std::uint64_t> blocks;
   };
 
-  void throw_into_bucket(std::uint32_t bucket, std::span<const std::uint32_t> candidates, std::uint64_t round,
-                         std::size_t count, Scratch& scratch) {
-    if (candidates.empty()) return;
-    std::vector<Dart>& darts = scratch.darts;
-    darts.clear();
-    CandidateStream stream(surface_, hash_words(seed_, round), count);
-    bool one_block = true;
-    for (const std::uint32_t i : candidates) {
-      const Point point = stream.make(i);
-      darts.push_back({SpaceBlocks::key(blocks_.at(point.position)), point});
-      one_block = one_block && darts.back().block == darts.front().block;
-    }
-    // Candidates come triangle by triangle, darts have to fly in no order.
-    Rng rng(hash_words(seed_, round, bucket, 1));
-    for (std::size_t i = darts.size(); i > 1; --i)
-      std::swap(darts[i - 1], darts[static_cast<std::size_t>((rng.next_bits() >> 32) * i >> 32)]);
-    if (!one_block)
-      std::stable_sort(darts.begin(), darts.end(),
-                       [](const Dart& a, const Dart& b) { return a.block < b.block; });
-    for (std::size_t begin = 0; begin < darts.size();) {
-      std::size_t end = begin + 1;
-      while (end < darts.size() && darts[end].block == darts[begin].block) ++end;
-      throw_into_block(bucket, std::span(darts).subspan(begin, end - begin), scratch);
-      begin = end;
+  // Candidates come triangle by triangle, darts have to fly in no order: each takes the place of any that was
+  // made before it, or its own.
+  static void make_darts(const CandidateStream& stream, std::span<const std::uint32_t> candidates,
+                         std::span<const std::uint32_t> triangles, std::uint64_t key,
+                         std::vector<Point>& darts) {
+    darts.resize(candidates.size());
+    Rng rng(key);
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const auto other = static_cast<std::size_t>((rng.next_bits() >> 32) * (i + 1) >> 32);
+      darts[i] = darts[other];
+      darts[other] = stream.make(candidates[i], triangles[candidates[i]]);
     }
   }
 
-  void throw_into_block(std::uint32_t bucket, std::span<const Dart> darts, Scratch& scratch) {
-    const BlockAt block = SpaceBlocks::from_key(darts.front().block);
+  void throw_into_bucket(std::uint32_t bucket, Scratch& scratch) {
+    if (scratch.darts.empty()) return;
+    scratch.blocks.clear();
+    for (const Point& dart : scratch.darts) {
+      const std::uint64_t block = SpaceBlocks::key(blocks_.at(dart.position));
+      if (scratch.blocks.empty() || scratch.blocks.back() != block) scratch.blocks.push_back(block);
+    }
+    const bool one_block = scratch.blocks.size() == 1;
+    std::sort(scratch.blocks.begin(), scratch.blocks.end());
+    scratch.blocks.erase(std::unique(scratch.blocks.begin(), scratch.blocks.end()), scratch.blocks.end());
+    for (const std::uint64_t block : scratch.blocks)
+      throw_into_block(bucket, SpaceBlocks::from_key(block), one_block, scratch);
+  }
+
+  void throw_into_block(std::uint32_t bucket, const BlockAt& block, bool alone, Scratch& scratch) {
     scratch.grid.move_to(blocks_.corner(block));
     SpaceBlocks::for_each_around(block, [&](const BlockAt& near) {
-      for (const Point& point : points_[blocks_.bucket(near)]) scratch.grid.add(point);
+      const Bucket& there = points_[blocks_.bucket(near)];
+      const std::size_t count = near == block ? there.points.size() : there.near_sides;
+      for (std::size_t i = 0; i < count; ++i) scratch.grid.add(there.points[i]);
     });
     scratch.stuck.clear();
-    for (const Dart& dart : darts)
-      if (scratch.grid.add_if_free(dart.point)) scratch.stuck.push_back(dart.point);
-    std::vector<Point>& points = points_[bucket];
-    points.reserve(points.size() + scratch.stuck.size());  // and not twice that
-    points.insert(points.end(), scratch.stuck.begin(), scratch.stuck.end());
+    for (const Point& dart : scratch.darts)
+      if ((alone || blocks_.at(dart.position) == block) && scratch.grid.add_if_free(dart))
+        scratch.stuck.push_back(dart);
+    Bucket& own = points_[bucket];
+    own.points.reserve(own.points.size() + scratch.stuck.size());  // and not twice that
+    for (const Point& point : scratch.stuck) {
+      own.points.push_back(point);
+      if (scratch.grid.is_near_side(point)) std::swap(own.points.back(), own.points[own.near_sides++]);
+    }
   }
 
   const GroupSurface& surface_;
   std::uint64_t seed_;
   float radius_;
   SpaceBlocks blocks_;
-  std::vector<Vec3> normals_;               // of triangles
-  std::vector<std::vector<Point>> points_;  // by bucket
+  std::vector<Vec3> normals_;  // of triangles
+  std::vector<Bucket> points_;
 };
 
 }  // namespace
@@ -317,12 +342,14 @@ std::vector<PlacedPoint> place_points(const GroupSurface& surface, double target
   DartThrower thrower(surface, box, static_cast<float>(radius), target, seed);
   double left = std::ceil(kCandidates * std::max(target, kFewestCandidates / kCandidates));
   progress.begin("placing samples", "candidates", static_cast<std::uint64_t>(left));
-  // On dust and hair, which have room for any number of points, nearly every dart sticks: no round throws
-  // more than are missing at the rate at which those of the round before stuck.
+  // On dust and hair, which have room for any number of points, nearly every dart sticks: the first rounds
+  // throw no more than are missing at the rate at which those of the round before stuck. Where that rate
+  // falls it will be half as high at most, and fewer rounds are faster.
   double rate = 1, count = 0;
   for (std::uint64_t round = 0; count < target && left >= 1; ++round) {
-    const double candidates = std::ceil(
-        std::min({(target - count) / rate, std::max(kCandidatesAtOnce * target, kFewestCandidates), left}));
+    const double candidates =
+        std::ceil(std::min({(target - count) / rate * (round > 1 ? 2 : 1),
+                            std::max(kCandidatesAtOnce * target, kFewestCandidates), left}));
     thrower.throw_round(round, static_cast<std::size_t>(candidates));
     const auto now = static_cast<double>(thrower.count());
     rate = (now - count) / candidates;

@@ -63,19 +63,31 @@ void PointBlocks::gather(const BlockAt& block, BlockNeighbourhood& near) const {
                 : std::clamp(static_cast<int>(at[axis] + 1) - 1, -1, BlockNeighbourhood::kBlockCells);
       near.cells_.push_back(static_cast<std::uint16_t>(BlockNeighbourhood::row_of(c[1], c[2]) +
                                                        static_cast<std::size_t>(c[0] + 1)));
-      near.unsorted_.push_back({position, points_[i].normal, i});
+      near.unsorted_.push_back(i);
     });
   });
-  near.sort_entries();
+  near.sort_entries(points_);
 }
 
-void BlockNeighbourhood::sort_entries() {
+void BlockNeighbourhood::sort_entries(std::span<const PlacedPoint> points) {
   begins_.fill(0);
   for (const std::uint16_t cell : cells_) ++begins_[cell + 1u];
   for (std::size_t c = 1; c < begins_.size(); ++c) begins_[c] += begins_[c - 1];
-  entries_.resize(unsorted_.size());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    entries_.positions[axis].resize(unsorted_.size() + kLanes - 1);
+    entries_.normals[axis].resize(unsorted_.size() + kLanes - 1);
+  }
+  entries_.indices.resize(unsorted_.size());
   // From the back, so that begins end up where they belong without a copy.
-  for (std::size_t i = unsorted_.size(); i-- > 0;) entries_[--begins_[cells_[i] + 1u]] = unsorted_[i];
+  for (std::size_t i = unsorted_.size(); i-- > 0;) {
+    const std::size_t to = --begins_[cells_[i] + 1u];
+    const PlacedPoint& point = points[unsorted_[i]];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      entries_.positions[axis][to] = point.position[static_cast<int>(axis)];
+      entries_.normals[axis][to] = point.normal[static_cast<int>(axis)];
+    }
+    entries_.indices[to] = unsorted_[i];
+  }
   for (std::size_t c = 0; c + 1 < begins_.size(); ++c) begins_[c] = begins_[c + 1];
   begins_.back() = static_cast<std::uint32_t>(entries_.size());
 }

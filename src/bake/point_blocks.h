@@ -12,23 +12,32 @@ namespace nacre {
 /// The points in one block and those within one cell of it, in a dense grid.
 class BlockNeighbourhood {
  public:
-  struct Entry {
-    Vec3 position, normal;
-    std::uint32_t index;  // of the point
+  static constexpr std::size_t kLanes = 4;
+  /// Everything about the points, cell by cell, in arrays of their own, where kLanes values can be read from
+  /// any entry on.
+  struct Entries {
+    std::array<std::vector<float>, 3> positions, normals;
+    std::vector<std::uint32_t> indices;  // of the points
+
+    std::size_t size() const { return indices.size(); }
+    Vec3 position(std::size_t i) const { return {positions[0][i], positions[1][i], positions[2][i]}; }
+    Vec3 normal(std::size_t i) const { return {normals[0][i], normals[1][i], normals[2][i]}; }
   };
 
   /// The points of the block itself.
   std::span<const std::uint32_t> own() const { return own_; }
   const Box3& box() const { return box_; }
-  /// Calls visit(entry) for all points within `reach` of a point of the block, and for some farther ones.
+  const Entries& entries() const { return entries_; }
+  /// Calls visit(begin, end) for ranges of entries that hold all points within `reach` of a point of the
+  /// block, and some farther ones.
   template <class Visit>
-  void for_each_near(const Vec3& position, const Visit& visit) const {
+  void for_each_range_near(const Vec3& position, const Visit& visit) const {
     const std::array<int, 3> c = cell_of(position);
     for (int z = c[2] - 1; z <= c[2] + 1; ++z)
       for (int y = c[1] - 1; y <= c[1] + 1; ++y) {
         // Three cells in a row are one range.
         const std::size_t row = row_of(y, z) + static_cast<std::size_t>(c[0]);
-        for (std::uint32_t i = begins_[row]; i < begins_[row + 3]; ++i) visit(entries_[i]);
+        if (begins_[row] < begins_[row + 3]) visit(std::size_t{begins_[row]}, std::size_t{begins_[row + 3]});
       }
   }
 
@@ -48,13 +57,14 @@ class BlockNeighbourhood {
   static std::size_t row_of(int y, int z) {
     return static_cast<std::size_t>(((z + 1) * kSide + y + 1) * kSide);
   }
-  void sort_entries();
+  void sort_entries(std::span<const PlacedPoint> points);
 
   Box3 box_;
   float inverse_ = 0;
   std::vector<std::uint32_t> own_;
-  std::vector<Entry> unsorted_, entries_;
-  std::vector<std::uint16_t> cells_;
+  Entries entries_;
+  std::vector<std::uint32_t> unsorted_;
+  std::vector<std::uint16_t> cells_;  // of those
   std::array<std::uint32_t, kSide * kSide * kSide + 1> begins_{};
 };
 

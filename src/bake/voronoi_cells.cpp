@@ -11,6 +11,7 @@
 #include <flann/flann.hpp>
 #pragma GCC diagnostic pop
 
+#include <bit>
 #include <optional>
 
 #include "bake/sheet_edges.h"
@@ -28,31 +29,30 @@ class Cell {
     corners_[3] = {-half_size, half_size};
   }
 
-  /// Keeps the points p with dot(p, normal) <= offset.
-  void clip(const Vec2& normal, float offset) {
-    if (square(offset) >= radius2_) return;
-    std::array<float, kMaxCorners> heights;  // above the line
-    bool any_above = false;
+  /// Keeps the points p with dot(p, direction) <= offset, whatever the length of `direction`.
+  void clip(const Vec2& direction, float offset) {
+    std::array<float, kMaxCorners> heights;  // above the line, in that length
+    float highest = 0;
     for (std::size_t i = 0; i < count_; ++i) {
-      heights[i] = corners_[i].dot(normal) - offset;
-      any_above = any_above || heights[i] > 0;
+      heights[i] = corners_[i].dot(direction) - offset;
+      highest = std::max(highest, heights[i]);
     }
-    if (!any_above || count_ + 2 > kMaxCorners) return;  // a cell of so many sides is round enough as it is
+    if (!(highest > 0) || count_ + 2 > kMaxCorners) return;  // a cell of so many sides is round enough
     std::array<Vec2, kMaxCorners> kept;
     std::size_t kept_count = 0;
-    radius2_ = 0;
-    const auto keep = [&](const Vec2& corner) {
-      kept[kept_count++] = corner;
-      radius2_ = std::max(radius2_, corner.length2());
-    };
     for (std::size_t i = 0; i < count_; ++i) {
       const std::size_t next = i + 1 < count_ ? i + 1 : 0;
-      if (heights[i] <= 0) keep(corners_[i]);
+      if (heights[i] <= 0) kept[kept_count++] = corners_[i];
       if ((heights[i] < 0) != (heights[next] < 0) && heights[i] != heights[next])
-        keep(corners_[i] + (corners_[next] - corners_[i]) * (heights[i] / (heights[i] - heights[next])));
+        kept[kept_count++] =
+            corners_[i] + (corners_[next] - corners_[i]) * (heights[i] / (heights[i] - heights[next]));
     }
-    std::copy_n(kept.begin(), kept_count, corners_.begin());
     count_ = kept_count;
+    radius2_ = 0;
+    for (std::size_t i = 0; i < kept_count; ++i) {
+      corners_[i] = kept[i];
+      radius2_ = std::max(radius2_, kept[i].length2());
+    }
   }
   float area() const {
     float twice = 0;
@@ -111,7 +111,10 @@ class CellCutter {
     box.min -= Vec3(kCellReach * spacing_);
     box.max += Vec3(kCellReach * spacing_);
     const bool edges_near = edges_.any_in(box);
-    std::vector<std::pair<float, const BlockNeighbourhood::Entry*>> neighbours;
+    const BlockNeighbourhood::Entries& entries = near.entries();
+    // Their squared distances, of which as floats above 0 the bits are in order, and which entries they are.
+    std::vector<std::uint64_t> neighbours(entries.size() + 1);
+    std::vector<float> distances2(entries.size());
     const float reach2 = square(kCellReach * spacing_);
     for (const std::uint32_t i : near.own()) {
       const PlacedPoint& point = points_[i];
@@ -122,18 +125,23 @@ class CellCutter {
       float done2 = 0;
       for (const float within2 : {square(kUsualReach * spacing_), reach2}) {
         if (4 * cell.radius2() <= done2) break;
-        neighbours.clear();
-        near.for_each_near(point.position, [&](const BlockNeighbourhood::Entry& entry) {
-          const float distance2 = (entry.position - point.position).length2();
-          if (distance2 < within2 && distance2 >= done2 && entry.index != i)
-            neighbours.emplace_back(distance2, &entry);
+        std::size_t count = 0;
+        near.for_each_range_near(point.position, [&](std::size_t begin, std::size_t end) {
+          for (std::size_t e = begin; e < end; ++e)
+            distances2[e - begin] = (entries.position(e) - point.position).length2();
+          for (std::size_t e = begin; e < end; ++e) {
+            // Without a branch for each. The point itself, at no distance, will cut nothing.
+            const float distance2 = distances2[e - begin];
+            neighbours[count] = std::uint64_t{std::bit_cast<std::uint32_t>(distance2)} << 32 | e;
+            count += (distance2 < within2) & (distance2 >= done2);
+          }
         });
-        std::sort(neighbours.begin(), neighbours.end(), [](const auto& a, const auto& b) {
-          return a.first != b.first ? a.first < b.first : a.second->index < b.second->index;
-        });
-        for (const auto& [distance2, entry] : neighbours) {
-          if (distance2 > 4 * cell.radius2()) break;
-          clip_by_neighbour(point, entry->position, entry->normal, frame, cell);
+        std::sort(neighbours.begin(), neighbours.begin() + static_cast<std::ptrdiff_t>(count));
+        for (std::size_t n = 0; n < count; ++n) {
+          if (std::bit_cast<float>(static_cast<std::uint32_t>(neighbours[n] >> 32)) > 4 * cell.radius2())
+            break;
+          const auto e = static_cast<std::uint32_t>(neighbours[n]);
+          clip_by_neighbour(point, entries.position(e), entries.normal(e), frame, cell);
         }
         done2 = within2;
       }
@@ -158,8 +166,8 @@ class CellCutter {
     if (dot(normal, point.normal) <= kSameSheetCosine) return;
     const Vec3 offset = position - point.position;
     const Vec2 flat(dot(offset, frame.s), dot(offset, frame.t));
-    const float flat_length = flat.length(), distance = offset.length();
-    if (flat_length > 0.05f * distance) cell.clip(flat / flat_length, distance / 2);
+    const float flat2 = flat.length2(), distance2 = offset.length2();
+    if (flat2 > square(0.05f) * distance2) cell.clip(flat, std::sqrt(flat2 * distance2) / 2);
   }
 
   // A border or a crease is a side of the cell where its nearest point to the sample is inside an edge, or is

@@ -16,7 +16,7 @@ struct Keyed {
   std::uint32_t index;
 };
 
-std::vector<Keyed> sort_by_morton_code(const std::vector<Vec3>& positions) {
+std::vector<Keyed> sort_by_morton_code(std::span<const Vec3> positions) {
   Box3 box;
   for (const Vec3& p : positions) box.extendBy(p);
   const Vec3 size = box.size();
@@ -34,9 +34,10 @@ std::vector<Keyed> sort_by_morton_code(const std::vector<Vec3>& positions) {
                   static_cast<std::uint32_t>(i)};
     }
   });
-  parallel_sort(keyed.begin(), keyed.end(), [](const Keyed& a, const Keyed& b) {
+  const auto before = [](const Keyed& a, const Keyed& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
-  });
+  };
+  if (!std::is_sorted(keyed.begin(), keyed.end(), before)) parallel_sort(keyed.begin(), keyed.end(), before);
   return keyed;
 }
 
@@ -123,6 +124,14 @@ void compute_moments(const CacheGroup& group, OctreeNode& node) {
 // Which sample comes i-th.
 using Order = std::vector<std::uint32_t>;
 
+Order order_of(const std::vector<Keyed>& keyed) {
+  Order order(keyed.size());
+  parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) order[i] = keyed[i].index;
+  });
+  return order;
+}
+
 // `values` in order, and then they are gone.
 template <class T, class U, class Store>
 void sort_into(const Order& order, std::vector<T>& values, std::span<U> sorted, const Store& store) {
@@ -150,26 +159,37 @@ void sort_triples(const Order& order, std::vector<Triple>& values, std::span<flo
   });
 }
 
+// What of all lights is kept in one vector, which that of a single light becomes if it is in order already:
+// ratios are a third of all that a sample takes.
+template <class T>
+void sort_of_lights(const Order& order, bool in_order, std::vector<SampleLight>& lights,
+                    std::vector<T> SampleLight::*member, std::vector<T>& sorted) {
+  if (in_order && lights.size() == 1) {
+    sorted = std::move(lights[0].*member);
+    return;
+  }
+  sorted.resize(order.size() * lights.size());
+  for (std::size_t l = 0; l < lights.size(); ++l)
+    sort_into(order, lights[l].*member, std::span(sorted).subspan(l * order.size(), order.size()),
+              [](std::span<T> to, std::size_t i, const T& value) { to[i] = value; });
+}
+
 void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGroup& owned, CacheGroup& group) {
   const std::size_t n = order.size(), count = lights.size();
   const auto all = [&](auto member) {
     return std::ranges::all_of(lights, [&](const SampleLight& light) { return (light.*member).size() == n; });
   };
-  const auto keep = [](auto& sorted, std::size_t i, const auto& value) { sorted[i] = value; };
-  const bool apart = count > 1, errors = all(&SampleLight::errors), ratios = all(&SampleLight::ratios);
+  const bool apart = count > 1, in_order = std::ranges::is_sorted(order);
   if (apart) owned.light_irradiance.resize(3 * n * count);
-  if (errors) owned.errors.resize(n * count);
-  if (ratios) owned.ratios.resize(n * count);
   for (std::size_t l = 0; l < count; ++l) {
-    SampleLight& light = lights[l];
-    group.lights.emplace_back().name = light.name;
+    group.lights.emplace_back().name = lights[l].name;
     const auto channel = [&](std::size_t k) {
       return std::span(owned.light_irradiance).subspan((3 * l + k) * n, n);
     };
-    if (apart) sort_triples(order, light.irradiance, channel(0), channel(1), channel(2));
-    if (errors) sort_into(order, light.errors, std::span(owned.errors).subspan(l * n, n), keep);
-    if (ratios) sort_into(order, light.ratios, std::span(owned.ratios).subspan(l * n, n), keep);
+    if (apart) sort_triples(order, lights[l].irradiance, channel(0), channel(1), channel(2));
   }
+  if (all(&SampleLight::errors)) sort_of_lights(order, in_order, lights, &SampleLight::errors, owned.errors);
+  if (all(&SampleLight::ratios)) sort_of_lights(order, in_order, lights, &SampleLight::ratios, owned.ratios);
   point_lights_into(group, owned.light_irradiance, owned.errors, owned.ratios);
 }
 
@@ -177,6 +197,10 @@ void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGrou
 
 double hexagonal_spacing(double area, double count) {
   return count > 0 ? std::sqrt(2 / std::sqrt(3.0) * area / count) : 0;
+}
+
+std::vector<std::uint32_t> octree_order(std::span<const Vec3> positions) {
+  return order_of(sort_by_morton_code(positions));
 }
 
 void sum_nodes(const CacheGroup& group, std::span<OctreeNode> nodes) {
@@ -192,14 +216,11 @@ CacheGroup build_group(std::string name, double surface_area, SurfaceSamples sam
          kMaxSamplesPerGroup);
   const auto owned = std::make_shared<OwnedGroup>();
   // Codes are gone before the planes come, and samples as these do: that is what takes most memory at once.
-  Order order(samples.size());
-  {
+  const Order order = [&] {
     const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
     owned->nodes = divide(keyed);
-    parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) order[i] = keyed[i].index;
-    });
-  }
+    return order_of(keyed);
+  }();
   CacheGroup group;
   group.name = std::move(name);
   group.surface_area = surface_area;
