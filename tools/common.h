@@ -96,6 +96,7 @@ std::string format_bytes(double bytes);
 // The subcommands. Each adds itself; its callback does the work.
 void add_bake_command(CLI::App& app, const std::string& command_line);
 void add_render_command(CLI::App& app, const std::string& command_line);
+void add_sweep_command(CLI::App& app, const std::string& command_line);
 void add_info_command(CLI::App& app, const std::string& command_line);
 void add_diff_command(CLI::App& app, const std::string& command_line);
 void add_materials_command(CLI::App& app, const std::string& command_line);

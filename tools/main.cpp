@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   const std::string line = join_arguments(argc, argv);
   nacre::tools::add_bake_command(app, line);
   nacre::tools::add_render_command(app, line);
+  nacre::tools::add_sweep_command(app, line);
   nacre::tools::add_info_command(app, line);
   nacre::tools::add_diff_command(app, line);
   nacre::tools::add_materials_command(app, line);

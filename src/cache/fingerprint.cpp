@@ -250,6 +250,11 @@ std::string samples_digest(const CacheGroup& group) {
   return digest(state);
 }
 
+std::string bytes_digest(std::string_view bytes) {
+  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
 std::string fingerprint_digest(const KeyValues& fingerprint) {
   const HashState state = make_hash();
   for (const auto& [key, value] : fingerprint) {

@@ -42,28 +42,38 @@ std::uint8_t encode_srgb(double linear) {
 
 }  // namespace
 
-void save_png(const Image& image, const std::string& path, double exposure) {
+Preview make_preview(const Image& image, const std::string& path, double exposure) {
   check_image(image, path);
   const Planes planes = find_rgb(image, path);
   const double scale = std::exp2(exposure);
   if (!std::isfinite(scale))
     fail(ErrorCode::kValue, path, "an exposure of {} EV is outside what nacre can scale by", exposure);
-  if ((3 * std::int64_t{image.width} + 1) * image.height > kMaxPngBytes)
-    fail(ErrorCode::kLimit, path, "{} x {} pixels are too many for a PNG; write OpenEXR alone", image.width,
-         image.height);
   const std::size_t pixels = planes[0]->size();
-  std::vector<std::uint8_t> bytes(3 * pixels);
+  Preview preview{image.width, image.height, std::vector<std::uint8_t>(3 * pixels)};
   parallel_for(pixels, 1 << 14, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      for (std::size_t c = 0; c < 3; ++c) bytes[3 * i + c] = encode_srgb((*planes[c])[i] * scale);
+      for (std::size_t c = 0; c < 3; ++c)
+        preview.rgb[3 * i + c] = encode_srgb(double{(*planes[c])[i]} * scale);
   });
-  AtomicFile file(path);
+  return preview;
+}
+
+std::vector<std::uint8_t> encode_png(const Preview& preview, const std::string& path) {
+  if ((3 * std::int64_t{preview.width} + 1) * preview.height > kMaxPngBytes)
+    fail(ErrorCode::kLimit, path, "{} x {} pixels are too many for a PNG; write OpenEXR alone", preview.width,
+         preview.height);
   int length = 0;
   const std::unique_ptr<unsigned char, decltype(&std::free)> png(
-      stbi_write_png_to_mem(bytes.data(), 3 * image.width, image.width, image.height, 3, &length),
+      stbi_write_png_to_mem(preview.rgb.data(), 3 * preview.width, preview.width, preview.height, 3, &length),
       &std::free);
   if (!png) fail(ErrorCode::kLimit, path, "the PNG does not fit into memory");
-  file.write(png.get(), static_cast<std::size_t>(length));
+  return {png.get(), png.get() + length};
+}
+
+void save_png(const Image& image, const std::string& path, double exposure) {
+  const std::vector<std::uint8_t> png = encode_png(make_preview(image, path, exposure), path);
+  AtomicFile file(path);
+  file.write(png.data(), png.size());
   file.commit();
 }
 

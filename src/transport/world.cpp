@@ -8,7 +8,17 @@ namespace nacre {
 World make_world(const Scene& scene, bool shadows) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  World world{&scene, RayTracer(meshes), {}, make_light_table(scene), shadows, {}};
+  World world{&scene, RayTracer(meshes), {}, {}, shadows, {}};
+  refresh(world);
+  return world;
+}
+
+void refresh(World& world) {
+  const Scene& scene = *world.scene;
+  world.lights = make_light_table(scene);
+  world.bsdfs.clear();
+  world.clear_glass.clear();
+  world.has_glass = false;
   for (const Shape& shape : scene.shapes) {
     const Bsdf bsdf =
         make_bsdf(shape.surface == kNone ? nullptr : &scene.surfaces[static_cast<std::size_t>(shape.surface)],
@@ -18,7 +28,6 @@ World make_world(const Scene& scene, bool shadows) {
     world.has_glass = world.has_glass || glass;
     world.bsdfs.push_back(bsdf);
   }
-  return world;
 }
 
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {

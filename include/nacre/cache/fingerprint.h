@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "nacre/cache/cache.h"
 #include "nacre/scene/scene.h"
@@ -26,6 +27,9 @@ BakeConditions fingerprint_conditions(const KeyValues& fingerprint, std::size_t 
 
 /// A 32-digit hash of a group's samples and octree, whatever scene they belong to.
 std::string samples_digest(const CacheGroup& group);
+
+/// A 32-digit hash of bytes, as they lie in a file.
+std::string bytes_digest(std::string_view bytes);
 
 /// A 32-digit hash of a fingerprint.
 std::string fingerprint_digest(const KeyValues& fingerprint);

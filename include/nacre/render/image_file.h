@@ -1,6 +1,7 @@
 // Images in memory, OpenEXR files, and PNG previews. The only files that see OpenEXR and stb.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -38,8 +39,17 @@ void save_exr(const Image& image, const std::string& path);
 /// kUnsupported (deep or multi-part), kLimit (a window of more than 2^28 pixels).
 Image load_exr(const std::string& path);
 
-/// 8-bit sRGB picture of R, G, B times 2^exposure, clipped, the alpha channel ignored (pictures have black
-/// behind them). Written like save_exr.
+/// 8-bit sRGB, rows from the top.
+struct Preview {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+};
+/// R, G, B times 2^exposure, clipped, the alpha channel ignored (pictures have black behind them). Throws
+/// Error with `path`: kValue for an exposure out of range or a channel that is missing, or a NaN.
+Preview make_preview(const Image& image, const std::string& path, double exposure);
+/// A PNG file's bytes. Throws Error(kLimit, path) for what no PNG holds.
+std::vector<std::uint8_t> encode_png(const Preview& preview, const std::string& path);
+/// Both, written like save_exr.
 void save_png(const Image& image, const std::string& path, double exposure);
 /// The exposure (EV) that puts the 99th percentile of the brightest channel of the covered pixels (alpha
 /// above 0; all if there is no alpha) at 0.8 of full scale; 0 for a black picture.

@@ -28,6 +28,8 @@ struct World {
 
 /// Throws Error(kValue) for an area light whose shape has no area; Error(kLimit) when memory runs out.
 World make_world(const Scene& scene, bool shadows);
+/// Follows its scene after media, surfaces or lights have changed, but no mesh. Throws as make_world.
+void refresh(World& world);
 
 /// Where a ray met a surface.
 struct SurfacePoint {

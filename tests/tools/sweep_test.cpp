@@ -1,0 +1,164 @@
+// label: cli
+// Sweeps: each picture is that of a single render, whatever way it came about.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "nacre/base/file.h"
+#include "nacre/render/image_file.h"
+#include "tools/cli.h"
+
+namespace nacre {
+namespace {
+
+using testing_support::run_nacre;
+using testing_support::TemporaryFolder;
+
+constexpr const char* kScene = R"(<scene version="0.6.0">
+  <default name="a" value="0.01, 0.02, 0.03"/>
+  <default name="s" value="1, 1.2, 1.5"/>
+  <default name="eta" value="1.5"/>
+  <integrator type="direct"/>
+  <sensor type="perspective" id="front">
+    <float name="fov" value="30"/>
+    <transform name="toWorld"><lookat origin="0, -40, 20" target="0, 0, 0" up="0, 0, 1"/></transform>
+    <sampler type="ldsampler"><integer name="sampleCount" value="2"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="36"/></film>
+  </sensor>
+  <sensor type="perspective" id="side">
+    <float name="fov" value="30"/>
+    <transform name="toWorld"><lookat origin="40, 0, 20" target="0, 0, 0" up="0, 0, 1"/></transform>
+    <sampler type="ldsampler"><integer name="sampleCount" value="2"/></sampler>
+    <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="36"/></film>
+  </sensor>
+  <shape type="sphere" id="ball">
+    <float name="radius" value="8"/>
+    <subsurface type="dipole" id="wax">
+      <rgb name="sigmaS" value="$s"/><rgb name="sigmaA" value="$a"/>
+      <float name="intIOR" value="$eta"/><float name="extIOR" value="1"/>
+    </subsurface>
+  </shape>
+  <shape type="rectangle" id="floor">
+    <transform name="toWorld"><scale value="40"/><translate z="-8"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.4, 0.3, 0.2"/></bsdf>
+  </shape>
+  <emitter type="point" id="spark">
+    <point name="position" x="20" y="-30" z="10"/><rgb name="intensity" value="3000, 2000, 1000"/>
+  </emitter>
+  <emitter type="directional" id="sun">
+    <vector name="direction" x="1" y="0.5" z="-1"/><rgb name="irradiance" value="1, 1, 1"/></emitter>
+</scene>
+)";
+
+class Sweep : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_.write("s.xml", kScene);
+    run("bake s.xml -o c.nacre --quiet --per-light --points 4000");
+  }
+  std::string run(const std::string& arguments, int expected = 0) {
+    const auto result = run_nacre(folder_, arguments);
+    EXPECT_EQ(result.exit_code, expected) << arguments << "\n" << result.output;
+    return result.output;
+  }
+  void expect_refusal(const std::string& arguments, int code, const std::string& text) {
+    const std::string output = run("sweep s.xml --cache c.nacre -o x " + arguments, code);
+    EXPECT_NE(output.find(text), std::string::npos) << output;
+    EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
+  }
+  void expect_same(const std::string& a, const std::string& b) {
+    const std::string output = run("diff " + a + " " + b + " --fail-above 0");
+    EXPECT_NE(output.find("identical"), std::string::npos) << output;
+  }
+  std::string bytes(const std::string& name) { return read_text_file(folder_.file(name)); }
+  nlohmann::json manifest(const std::string& folder) {
+    return nlohmann::json::parse(bytes(folder + "/manifest.json"));
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Sweep, EveryPictureIsThatOfASingleRender) {
+  run("sweep s.xml --cache c.nacre -o d --quiet --vary sigma_a=0.02:0.08:3 --vary 'eta=1.5;1.3'");
+  const char* const absorptions[] = {"0.02", "0.05", "0.08"};
+  int index = 0;
+  for (const char* a : absorptions)
+    for (const char* eta : {"1.5", "1.3"}) {
+      run(std::string("render s.xml --cache c.nacre -o r.exr --quiet -D a=") + a + " -D eta=" + eta);
+      expect_same("d/000" + std::to_string(++index) + ".exr", "r.exr");
+    }
+  const nlohmann::json json = manifest("d");
+  ASSERT_EQ(json["pictures"].size(), 6u);
+  EXPECT_EQ(json["pictures"][3]["settings"]["eta"], "1.3");
+  EXPECT_NEAR(json["pictures"][3]["coefficients"]["sigma_a"][0].get<double>(), 0.05, 1e-7);
+  for (const char* name : {"d/0006.png", "d/contact_sheet.png", "d/index.html"})
+    EXPECT_GT(bytes(name).size(), 100u) << name;
+}
+
+TEST_F(Sweep, MultipliesCamerasLightsAndLists) {
+  run("sweep s.xml --cache c.nacre -o d --quiet --zip --vary sigma_s_prime*=1:2:2 --vary 'camera=front;side' "
+      "--vary 'light.sun=0;1,0.5,0'");
+  run("render s.xml --cache c.nacre -o a.exr --quiet --light sun=0");
+  run("render s.xml --cache c.nacre -o b.exr --quiet --camera side --light sun=1,0.5,0 -D s=2,2.4,3");
+  expect_same("d/0001.exr", "a.exr");
+  expect_same("d/0002.exr", "b.exr");
+  folder_.write("p.csv",
+                "camera,sigma_s_prime,light.sun\nfront,\"1,1.2,1.5\",0\nside,\"2,2.4,3\",\"1,0.5,0\"\n");
+  run("sweep s.xml --cache c.nacre -o e --quiet --plan p.csv");
+  expect_same("e/0002.exr", "b.exr");
+  folder_.write("p.json", R"([{"material": "Marble", "scale": 2}, {"mfp": 0.5, "g": "0.5,0.5,0.5"}])");
+  run("sweep s.xml --cache c.nacre -o f --quiet --plan p.json");
+  EXPECT_EQ(manifest("f")["pictures"][0]["coefficients"]["scale"], 2.0);
+}
+
+TEST_F(Sweep, GoesOnWhereItWas) {
+  const std::string sweep = "sweep s.xml --cache c.nacre -o d --vary sigma_a=0.01:0.04:4";
+  run(sweep);
+  const std::string whole = bytes("d/0003.exr");
+  const auto renders = [&](const std::string& command, int count) {
+    const std::string output = run(command);
+    EXPECT_NE(output.find(std::to_string(count) + " of 4 pictures to render"), std::string::npos) << output;
+  };
+  renders(sweep, 0);
+  std::filesystem::remove(folder_.file("d/0002.exr"));
+  std::filesystem::resize_file(folder_.file("d/0003.exr"), whole.size() / 2);
+  folder_.write("d/points/0004.json", "{");
+  renders(sweep, 3);
+  EXPECT_EQ(bytes("d/0003.exr"), whole);
+  renders(sweep, 0);
+  renders(sweep + " --spp 3", 4);
+  EXPECT_NE(bytes("d/0003.exr"), whole);
+}
+
+TEST_F(Sweep, ShardsMakeTheSameFiles) {
+  const std::string sweep = "sweep s.xml --cache c.nacre --quiet --vary sigma_a=0.01:0.05:5 -o ";
+  run(sweep + "d");
+  run(sweep + "e --shard 2/2");
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("e/manifest.json")));
+  run(sweep + "e --shard 1/2 --threads 1");
+  for (const char* name : {"0001.exr", "0002.exr", "0005.exr", "0004.png", "contact_sheet.png", "index.html"})
+    EXPECT_EQ(bytes(std::string("d/") + name), bytes(std::string("e/") + name)) << name;
+}
+
+TEST_F(Sweep, RefusesWhatItCannotVary) {
+  expect_refusal("", 2, "--vary");
+  expect_refusal("--vary sigma_a", 2, "no =");
+  expect_refusal("--vary colour=1:2:3", 2, "'colour' is none of");
+  expect_refusal("--vary sigma_a=1:2", 2, "no range");
+  expect_refusal("--vary sigma_a=0:2:3:log", 2, "above 0");
+  expect_refusal("--vary sigma_a=1:2:3 --vary sigma_a*=1:2:3", 2, "twice");
+  expect_refusal("--vary sigma_a=1:2:3 --vary g=0:0.5:2 --zip", 2, "--zip: sigma_a has 3");
+  expect_refusal("--vary sigma_a=1:2:3 --shard 3/2", 2, "K/N");
+  expect_refusal("--vary material=Marbel", 1, "Marble");
+  expect_refusal("--vary eta=0.5:1:2", 1, "outside");
+  expect_refusal("--vary camera=top", 1, "front");
+  expect_refusal("--vary light.moon=1", 1, "moon");
+  expect_refusal("--vary sigma_a=1:2:2 --medium glass", 1, "glass");
+  folder_.write("p.csv", "sigma_a,g\n1\n");
+  expect_refusal("--plan p.csv", 1, "p.csv:2");
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("x")));
+}
+
+}  // namespace
+}  // namespace nacre

@@ -1,0 +1,39 @@
+// Options of all commands that render, and what they come to.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common.h"
+#include "nacre/render/render.h"
+
+namespace nacre::tools {
+
+struct RenderOptions {
+  CommonOptions common;
+  SceneOptions scene;
+  BakeOptions bake;
+  std::string cache, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  std::vector<std::string> lights;
+  int samples_per_pixel = 0;
+  std::optional<double> tolerance;
+  std::optional<int> single_samples, mc_samples;
+  std::optional<std::string> mc_sampling;
+  bool certified = false;
+};
+
+/// All but the common ones, those of scenes and of bakes.
+void add_render_options(CLI::App& command, RenderOptions& options);
+Method method_of(const RenderOptions& options);
+/// Of the camera with that id, or the first. Throws UsageError for a size, crop or list of channels that
+/// cannot be read; what find_camera throws.
+RenderParams make_render_params(const RenderOptions& options, const Scene& scene, const std::string& camera);
+/// Stops, or none for "auto". Throws UsageError.
+std::optional<double> parse_exposure(const std::string& text);
+/// Throws UsageError where an option has nothing to act on.
+void check_render_options(const RenderOptions& options);
+/// Media in which no light is traced that scatters once, where that was asked for.
+Warnings check_single_scattering(const Scene& scene, const RenderOptions& options);
+
+}  // namespace nacre::tools
