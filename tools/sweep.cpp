@@ -1,5 +1,6 @@
 // nacre sweep: many pictures of a scene from one cache.
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -17,7 +18,7 @@ namespace nacre::tools {
 namespace {
 
 // Pictures that are rendered together: what they may take, bytes a pixel of one of them, and how many.
-constexpr std::size_t kBatchBytes = std::size_t{1} << 30, kPixelBytes = 220, kLargestBatch = 16;
+constexpr std::size_t kBatchBytes = std::size_t{4} << 30, kPixelBytes = 220, kLargestBatch = 16;
 constexpr int kThumbnailEdge = 256;
 
 struct Options : RenderOptions {
@@ -218,6 +219,14 @@ void render_points(const Options& options, Scene& scene, std::size_t medium,
   }
 }
 
+// A float as it is read, without the digits that a double adds.
+double shortest(float value) {
+  double result = 0;
+  const std::string text = fmt::format("{}", value);
+  std::from_chars(text.data(), text.data() + text.size(), result);
+  return result;
+}
+
 // Previews at one exposure, the sheet, the page and the manifest, once every picture is there.
 void assemble(const Options& options, const SweepPlan& plan, const std::vector<Point>& points,
               const std::vector<SweepRecord>& records, std::optional<double> exposure, Session& session) {
@@ -230,7 +239,15 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
     for (const Point& point : points)
       exposure = std::min(*exposure, auto_exposure(load_exr(options.output + "/" + file_of(point, ".exr"))));
   }
-  std::vector<SheetPicture> pictures;
+  std::vector<SheetPicture> pictures(points.size());
+  parallel_for(points.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Image image = load_exr(options.output + "/" + file_of(points[i], ".exr"));
+      save_png(image, options.output + "/" + file_of(points[i], ".png"), *exposure);
+      pictures[i] = {file_of(points[i], ".png"), *points[i].settings,
+                     make_preview(shrink(image, kThumbnailEdge), options.output, *exposure)};
+    }
+  });
   nlohmann::ordered_json manifest;
   manifest["nacre"] = kVersion;
   manifest["scene"] = options.scene.path;
@@ -243,19 +260,17 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Point& point = points[i];
-    const Image image = load_exr(options.output + "/" + file_of(point, ".exr"));
-    save_png(image, options.output + "/" + file_of(point, ".png"), *exposure);
-    pictures.push_back({file_of(point, ".png"), *point.settings,
-                        make_preview(shrink(image, kThumbnailEdge), options.output, *exposure)});
     nlohmann::ordered_json entry;
     for (const Setting& setting : *point.settings)
       entry["settings"][setting.key + (setting.relative ? "*" : "")] = setting.value;
-    const auto triple = [](const Rgb& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
+    const auto triple = [](const Rgb& v) {
+      return nlohmann::ordered_json{shortest(v.x), shortest(v.y), shortest(v.z)};
+    };
     entry["coefficients"] = {{"sigma_s_prime", triple(reduce(point.material).sigma_s_prime)},
                              {"sigma_a", triple(point.material.sigma_a)},
                              {"g", triple(point.material.g)},
-                             {"eta", point.material.eta()},
-                             {"scale", point.material.scale}};
+                             {"eta", shortest(point.material.eta())},
+                             {"scale", shortest(point.material.scale)}};
     entry["exr"] = file_of(point, ".exr");
     entry["png"] = file_of(point, ".png");
     entry["xxh3"] = records[i].digest;

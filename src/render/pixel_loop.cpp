@@ -155,11 +155,12 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
   std::vector<const Path*> owners;
   std::vector<Hit> hits;
   std::vector<ExitPoint> points;
-  std::vector<Rgb> radiance;
+  std::vector<Rgb> radiance, transmittances;
   for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
     owners.clear();
     hits.clear();
     points.clear();
+    transmittances.clear();
     {
       const StageClock clock(totals.surface);
       for (const Path& path : paths) {
@@ -171,6 +172,8 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
             {path.hit, surface_point(world_, path.hit), -path.ray.ray.direction,
              pixel_key(path.pixel, 200 + hash_words(static_cast<std::uint64_t>(wave), path.branch)),
              path.sample});
+        transmittances.push_back(
+            exit_transmittance(world_, path.hit, points.back().surface, points.back().out));
       }
       totals.shading_points += points.size();
     }
@@ -190,7 +193,8 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
       }
       {
         const StageClock clock(totals.surface);
-        for (std::size_t i = 0; i < points.size(); ++i) radiance[i] *= medium.exit_weight(points[i]);
+        for (std::size_t i = 0; i < points.size(); ++i)
+          radiance[i] *= transmittances[i] * medium.exit_factor();
         add(Layer::kDiffusion);
       }
       if (!medium.has_single_scattering()) continue;
@@ -209,6 +213,7 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
 void PixelLoop::shade(const Path& path, int wave, std::span<PixelBuffer> pictures,
                       std::vector<Path>& next) const {
   const auto add = [&](Layer layer, const Rgb& value) {
+    if (value == Rgb(0, 0, 0)) return;  // there are as many as pictures to add it to
     for (PixelBuffer& pixels : pictures) pixels.add(layer, path.pixel, value);
   };
   add(path.layer, path.throughput * emitted_radiance(world_, path.ray, path.hit));

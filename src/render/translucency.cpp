@@ -23,7 +23,7 @@ Translucency::Translucency(const World& world, std::size_t medium, const Medium&
       material_(material),
       method_(material.lambert ? Method::kLambert : params.method),
       eta_(material.eta()),
-      exit_factor_(exit_factor(material)),
+      exit_factor_(nacre::exit_factor(material)),
       bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
       light_samples_(world.scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
@@ -129,10 +129,6 @@ void Translucency::eval_diffusion(std::span<const Hit> hits, std::span<const Exi
                                          point.sample * static_cast<std::uint32_t>(mc_samples_));
     evaluations += static_cast<std::uint64_t>(mc_samples_);
   }
-}
-
-Rgb Translucency::exit_weight(const ExitPoint& point) const {
-  return exit_transmittance(world_, point.hit, point.surface, point.out) * exit_factor_;
 }
 
 void Translucency::eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance,

@@ -42,8 +42,8 @@ class Translucency {
   /// `evaluations` those of the profile.
   void eval_diffusion(std::span<const Hit> hits, std::span<const ExitPoint> points, std::span<Rgb> exitance,
                       std::uint64_t& evaluations) const;
-  /// From exitance to the radiance that leaves towards the eye.
-  Rgb exit_weight(const ExitPoint& point) const;
+  /// From exitance to the radiance that leaves towards the eye, its transmittance at the boundary apart.
+  float exit_factor() const { return exit_factor_; }
   /// Evaluates diffusion on the whole surface, where it is kept.
   void fill(std::uint64_t& evaluations) const {
     if (field_) field_->fill(evaluations);
