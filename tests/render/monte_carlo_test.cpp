@@ -82,7 +82,7 @@ TEST(Plane, MeanIsTheTotalOfTheProfile) {
       add_shape(scene, placed(make_rectangle(), 6, {3, 1, 0}), kNone, add_medium(scene, medium));
       add_directional_light(scene, {0, 0, -1}, {1, 2, 3});
       const World world = make_world(scene, true);
-      const MonteCarloDiffusion diffusion(world, 0, sampling, 0);
+      const MonteCarloDiffusion diffusion(world, 0, scene.media[0], sampling, 0);
       const SurfacePoint point = surface_point(world, world.tracer.intersect({{3.2f, 1.1f, 1}, {0, 0, -1}}));
       const auto profiles = make_profiles(medium);
       // Its own noise, from independent groups of samples.

@@ -39,7 +39,7 @@ TEST(CoarseMesh, LooksAsSmoothAsItsNormals) {
         add_shape(scene, std::move(mesh), kNone, add_medium(scene, medium));
         add_directional_light(scene, light, {1, 1, 1});
         const World world = make_world(scene, true);
-        const SingleScattering single(world, 0);
+        const SingleScattering single(world, 0, world.scene->media[0]);
         std::vector<double> values;
         LostSamples lost;
         for (int i = 0; i < 200; ++i) {
@@ -78,7 +78,7 @@ TEST(CoarseMesh, StaysAsThinAsItIs) {
     add_shape(scene, std::move(plate), kNone, add_medium(scene, medium));
     add_directional_light(scene, {0.1f, 0.2f, 1}, {1, 1, 1});
     const World world = make_world(scene, true);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     LostSamples lost;
     double sum = 0;
     for (std::uint32_t i = 0; i < 256; ++i) {
@@ -97,7 +97,7 @@ TEST(OtherObjects, CastFullShadowsUnlessShadowsAreOff) {
   add_directional_light(scene, {0, 0, -1}, {1, 1, 1});
   const auto estimate = [&](bool shadows) {
     const World world = make_world(scene, shadows);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     return estimate_many(single, point_at(world, {0, 0, 5}, {0, 0, -1}), Vec3(1, 0, 1).normalized(), 8, 64)
         .mean;
   };
@@ -130,7 +130,7 @@ TEST(OpenMesh, EndsAtItsBoundingBox) {
     add_shape(scene, std::move(cube), kNone, add_medium(scene, make_test_medium()));
     add_directional_light(scene, {0.2f, 0.1f, 1}, {1, 1, 1});  // from below
     const World world = make_world(scene, true);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     LostSamples lost;
     const Rgb value =
         single.estimate(point_at(world, {0.3f, 0.2f, 5}, {0, 0, -1}), {0, 0, 1}, 4096, 1, 0, lost);
@@ -150,7 +150,7 @@ TEST(Sampling, WellDistributedPointsBeatIndependentOnes) {
   add_shape(scene, placed(make_sphere(), 4, {0, 0, 0}), kNone, add_medium(scene, make_test_medium()));
   add_area_light(scene, flipped(placed(make_rectangle(), 3, {1, 2, 9})), {10, 10, 10});
   const World world = make_world(scene, true);
-  const SingleScattering single(world, 0);
+  const SingleScattering single(world, 0, world.scene->media[0]);
   const SurfacePoint point = point_at(world, {1, 0.5f, 6}, {0, 0, -1});
   const Vec3 out = Vec3(0.3f, 0.2f, 1).normalized();
   // Variance of the mean of n samples: one sequence, or a new scramble for each.
@@ -199,7 +199,7 @@ TEST(Extremes, GiveFiniteRadiance) {
       add_point_light(scene, {1e3f, 4, 0}, {1, 1, 1});  // on the surface
       add_directional_light(scene, {0, 0, 1}, {1, 1, 1});
       const World world = make_world(scene, true);
-      const SingleScattering single(world, 0);
+      const SingleScattering single(world, 0, world.scene->media[0]);
       LostSamples lost;
       for (int i = 0; i < 200; ++i) {
         const Vec3 from = sample_uniform_sphere(sobol_2d(static_cast<std::uint32_t>(i), 3));

@@ -41,7 +41,7 @@ TEST(HalfSpace, BothConventionsMeetTheirClosedForms) {
         const Rgb irradiance(2, 3, 5);
         add_directional_light(scene, Vec3(-in), irradiance);
         const World world = make_world(scene, true);
-        const SingleScattering single(world, 0);
+        const SingleScattering single(world, 0, world.scene->media[0]);
         const SurfacePoint point = point_at(world, Vec3(0.3f, 0.2f, 1), {0, 0, -1});
         const Estimate estimate = estimate_many(single, point, Vec3(out), 64, 1024);
 
@@ -157,7 +157,7 @@ TEST(Sphere, MeetsQuadrature) {
     const Vec3d light(3, 9, 6), emission(100, 200, 300);
     add_point_light(scene, Vec3(light), Rgb(Vec3(emission)));
     const World world = make_world(scene, true);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     // From the lit side to the unlit one.
     for (const Vec3d& eye : {Vec3d(2, 8, 3), Vec3d(10, 1, 2), Vec3d(-3, -2, 9), Vec3d(-2, -9, -3)}) {
       const Vec3d out = eye.normalized();
@@ -221,7 +221,7 @@ TEST(ConcaveBody, MeetsQuadratureThroughSeveralEntriesAndExits) {
     const Vec3d light = Vec3d(1, 0.137, 0.071).normalized(), emission(4, 5, 6);
     add_directional_light(scene, Vec3(-light), Rgb(Vec3(emission)));
     const World world = make_world(scene, true);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     struct View {
       Vec3d x, normal, out;
     };
@@ -250,7 +250,7 @@ TEST(OverlappingBodies, AttenuateAsTheirUnion) {
     add_directional_light(scene, {0.3f, -0.2f, 1}, {1, 1, 1});
     add_directional_light(scene, {0.9f, 0.2f, -0.3f}, {1, 1, 1});
     const World world = make_world(scene, true);
-    const SingleScattering single(world, 0);
+    const SingleScattering single(world, 0, world.scene->media[0]);
     return estimate_many(single, point_at(world, {0.3f, 0.2f, 9}, {0, 0, -1}), {0, 0, 1}, 16, 256);
   };
   const Estimate whole = estimate({{Vec3(-2, -2, -3), Vec3(2, 2, 4)}});
