@@ -43,7 +43,7 @@ const std::vector<Library> kLibraries{
     {"IlmThread", {"src/render/"}},
     {"OpenEXR/", {"src/render/"}},
     {"openexr", {"src/render/"}},
-    {"stb", {"src/render/", "src/scene/bitmap.cpp"}},
+    {"stb", {"src/render/", "src/scene/bitmap.cpp", "tools/contact_sheet.cpp"}},
     {"CLI/", {"tools/"}},
 };
 const std::vector<std::string> kSystemHeaders{"sys/",     "fcntl.h",  "unistd.h",
