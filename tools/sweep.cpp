@@ -356,11 +356,11 @@ void add_sweep_command(CLI::App& app, const std::string& command_line) {
   add_scene_options(*command, options->scene);
   command->add_option("-o,--output", options->output, "Folder to write pictures to")->required();
   command
-      ->add_option(
-          "--vary", options->vary,
-          "KEY=A:B:COUNT[:log] (all channels), KEY*=A:B:COUNT[:log] (times the scene's) or "
-          "KEY=v1;v2;... (numbers, r,g,b or names); KEY is sigma_a, sigma_s_prime, mfp, g, eta, scale, "
-          "material, light.ID or camera; several make a grid")
+      ->add_option("--vary", options->vary,
+                   "KEY=A:B:COUNT[:log] (all channels), KEY*=A:B:COUNT[:log] (times the scene's) or "
+                   "KEY=v1;v2;... (numbers, r,g,b or names); KEY is sigma_a, sigma_s_prime, mfp, albedo, g, "
+                   "eta, scale, "
+                   "material, light.ID or camera; several make a grid")
       ->take_all();
   command->add_flag("--zip", options->zip, "Walk several --vary together instead of as a grid");
   command->add_option("--plan", options->plan, "List of points: .csv with a header of keys, or .json");

@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "nacre/base/error.h"
+#include "nacre/optics/invert_albedo.h"
+#include "nacre/optics/profile.h"
 
 namespace nacre {
 namespace {
 
-constexpr std::array<std::string_view, 7> kKeys{"material",      "scale",   "eta", "g",
-                                                "sigma_s_prime", "sigma_a", "mfp"};
+constexpr std::array<std::string_view, 8> kKeys{"material",      "scale",   "eta", "g",
+                                                "sigma_s_prime", "sigma_a", "mfp", "albedo"};
 
 Rgb parse_triple(const Setting& setting, const std::string& place) {
   std::vector<float> values;
@@ -95,6 +97,20 @@ void apply_setting(Medium& medium, const Setting& setting, const std::string& pl
     for (int k = 0; k < 3; ++k) {
       scattering[k] = reduced.alpha_prime[k] / length[k];
       medium.sigma_a[k] = (1 - reduced.alpha_prime[k]) / length[k];
+    }
+    set_scattering(scattering);
+  } else if (key == "albedo") {
+    const double eta = double{medium.eta()};
+    Rgb old;
+    const auto profiles = make_profiles(medium);
+    for (int k = 0; k < 3; ++k) old[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
+    const Rgb total = check(value(old), 0, static_cast<float>(largest_albedo(medium.profile, eta)));
+    Rgb scattering;
+    for (int k = 0; k < 3; ++k) {
+      const auto [sigma_s_prime, sigma_a] =
+          invert_albedo(medium.profile, double{total[k]}, double{reduced.mean_free_path[k]}, eta);
+      scattering[k] = static_cast<float>(sigma_s_prime);
+      medium.sigma_a[k] = static_cast<float>(sigma_a);
     }
     set_scattering(scattering);
   } else {

@@ -1,5 +1,7 @@
 // label: unit
 // <subsurface>: coefficients, presets, indices of refraction.
+#include "nacre/base/error.h"
+#include "nacre/optics/profile.h"
 #include "scene/scene_text.h"
 
 namespace nacre {
@@ -104,6 +106,49 @@ TEST(SubsurfaceElement, APresetWithoutScaleAndQualityAreNoted) {
   EXPECT_EQ(warnings(R"(<float name="scale" value="1"/>)", "in 1/mm"), 0);
   EXPECT_EQ(warnings(kManual, "in 1/mm"), 0);
   EXPECT_EQ(warnings(R"(<float name="quality" value="0.2"/>)", "quality has no effect"), 1);
+}
+
+TEST(SubsurfaceElement, CoefficientsFromReflectanceAndMeanFreePath) {
+  for (const std::string profile : {"dipole", "betterdipole", "normalized"})
+    for (const std::string g : {"0", "0.8"}) {
+      const Medium medium = medium_of(
+          R"(<rgb name="diffuseReflectance" value="0.9 0.5 0.05"/><rgb name="meanFreePath" value="2 1 0.5"/>
+             <float name="scale" value="10"/><float name="intIOR" value="1.4"/><float name="g" value=")" +
+          g + R"("/><string name="profile" value=")" + profile + "\"/>");
+      const auto profiles = make_profiles(medium);
+      EXPECT_NEAR(profiles[0].total, 0.9, 1e-5) << profile;
+      EXPECT_NEAR(profiles[1].total, 0.5, 1e-5) << profile;
+      EXPECT_NEAR(profiles[2].total, 0.05, 1e-5) << profile;
+      expect_color(reduce(medium).mean_free_path, {2, 1, 0.5f});  // mm, whatever the scale
+    }
+}
+
+TEST(SubsurfaceElement, ReflectanceErrors) {
+  const auto message = [](const std::string& parameters) -> std::string {
+    try {
+      medium_of(parameters);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string path = R"(<float name="meanFreePath" value="1"/>)";
+  const std::string grey = R"(<rgb name="diffuseReflectance" value="0.5"/>)";
+  for (const char* value : {"0.5 1.01 0.5", "0.5 0.5 -0.1"}) {
+    const std::string text =
+        message(R"(<rgb name="diffuseReflectance" value=")" + std::string(value) + "\"/>" + path);
+    EXPECT_NE(text.find("scene.xml:2: "), std::string::npos) << text;
+    EXPECT_NE(text.find("give values from 0 to 1"), std::string::npos) << text;
+  }
+  EXPECT_NE(message(grey).find("meanFreePath is missing"), std::string::npos);
+  EXPECT_NE(message(path).find("diffuseReflectance is missing"), std::string::npos);
+  EXPECT_NE(message(grey + R"(<float name="meanFreePath" value="0"/>)").find("meanFreePath"),
+            std::string::npos);
+  EXPECT_NE(message(grey + path + R"(<string name="material" value="Marble"/>)")
+                .find("here are material, diffuseReflectance, meanFreePath"),
+            std::string::npos);
+  EXPECT_NE(message(grey + path + kManual).find("here are sigmaS, sigmaA, diffuseReflectance"),
+            std::string::npos);
 }
 
 }  // namespace

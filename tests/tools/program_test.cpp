@@ -328,6 +328,9 @@ TEST_F(Program, InfoOnEverything) {
   EXPECT_NE(cache.find("shares add up to 1.0000"), std::string::npos) << cache;
   EXPECT_NE(run("info a.exr").find("diffusion.R"), std::string::npos);
   EXPECT_NE(run("materials").find("Spectralon"), std::string::npos);
+  const std::string found = run("materials --from-albedo 0.9,0.5,0.05 --mfp 2 --profile betterdipole");
+  EXPECT_NE(found.find("0.90000  0.50000  0.05000"), std::string::npos) << found;
+  EXPECT_NE(run("materials --from-albedo 1.1 --mfp 1", 2).find("from 0 to 1"), std::string::npos);
 }
 
 TEST_F(Program, AMeshFileIsAScene) {

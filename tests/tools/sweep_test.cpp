@@ -110,6 +110,10 @@ TEST_F(Sweep, MultipliesCamerasLightsAndLists) {
   folder_.write("p.json", R"([{"material": "Marble", "scale": 2}, {"mfp": 0.5, "g": "0.5,0.5,0.5"}])");
   run("sweep s.xml --cache c.nacre -o f --quiet --plan p.json");
   EXPECT_EQ(manifest("f")["pictures"][0]["coefficients"]["scale"], 2.0);
+  run("sweep s.xml --cache c.nacre -o g --quiet --zip --vary 'albedo=0.8,0.6,0.4;0.5' --vary mfp=1:0.5:2");
+  const nlohmann::json dim = manifest("g")["pictures"][1]["coefficients"];
+  EXPECT_NEAR(dim["sigma_a"][0].get<double>() + dim["sigma_s_prime"][0].get<double>(), 2, 1e-5);
+  EXPECT_EQ(dim["sigma_a"][0], dim["sigma_a"][2]);
 }
 
 TEST_F(Sweep, GoesOnWhereItWas) {
@@ -152,6 +156,7 @@ TEST_F(Sweep, RefusesWhatItCannotVary) {
   expect_refusal("--vary sigma_a=1:2:3 --shard 3/2", 2, "K/N");
   expect_refusal("--vary material=Marbel", 1, "Marble");
   expect_refusal("--vary eta=0.5:1:2", 1, "outside");
+  expect_refusal("--vary albedo=0.5:1.5:2", 1, "outside");
   expect_refusal("--vary camera=top", 1, "front");
   expect_refusal("--vary light.moon=1", 1, "moon");
   expect_refusal("--vary sigma_a=1:2:2 --medium glass", 1, "glass");

@@ -16,10 +16,12 @@ struct Setting {
 };
 
 /// Keys of what fills a medium, in the order in which settings are applied: material, scale (mm per scene
-/// unit), eta, g, sigma_s_prime, sigma_a (1/mm), mfp (l' = 1/sigma_t', mm).
+/// unit), eta, g, sigma_s_prime, sigma_a (1/mm), mfp (l' = 1/sigma_t', mm), albedo (the
+/// profile's total diffuse reflectance).
 bool is_medium_key(const std::string& key);
 
-/// Changes a medium; all others of its coefficients stay: sigma_s' under a new g, alpha' under a new mfp.
+/// Changes a medium; all others of its coefficients stay: sigma_s' under a new g, alpha' under a new mfp,
+/// l' under a new albedo.
 /// Throws Error(kValue, place) for a name that is none, a number that is out of range, and what is not
 /// the medium's.
 void apply_setting(Medium& medium, const Setting& setting, const std::string& place);
