@@ -67,10 +67,10 @@ void print_inversion(const Options& options) {
       medium.sigma_a[k] = static_cast<float>(sigma_a);
     }
     const auto profiles = make_profiles(medium);
-    lines += fmt::format("{:<13} {}   {}   {}{:<8.5f} {:<8.5f} {:.5f}\n", kProfileNames[i],
-                         digits(medium.sigma_s), digits(medium.sigma_a),
-                         options.g ? digits(medium.sigma_s / (1 - g)) + "   " : "", profiles[0].total,
-                         profiles[1].total, profiles[2].total);
+    lines +=
+        fmt::format("{:<13} {}   {}   {}{:<8.5f} {:<8.5f} {:.5f}\n", kProfileNames[i], digits(medium.sigma_s),
+                    digits(medium.sigma_a), options.g ? digits(medium.sigma_s / (1 - g)) + "   " : "",
+                    profiles[0].total, profiles[1].total, profiles[2].total);
   }
   fmt::print("{}", lines);
 }

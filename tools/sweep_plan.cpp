@@ -44,7 +44,8 @@ std::optional<Number> parse(const std::string& text) {
 bool is_key(const std::string& key) {
   return is_medium_key(key) || key == "camera" || (key.starts_with("light.") && key.size() > 6);
 }
-constexpr const char* kKeys = "sigma_a, sigma_s_prime, mfp, albedo, g, eta, scale, material, light.ID, camera";
+constexpr const char* kKeys =
+    "sigma_a, sigma_s_prime, mfp, albedo, g, eta, scale, material, light.ID, camera";
 
 // "sigma_a*": what is there is multiplied.
 Setting make_setting(std::string key, std::string value) {

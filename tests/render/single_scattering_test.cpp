@@ -277,8 +277,9 @@ TEST(FlatSheet, IsAHalfSpace) {
     add_directional_light(scene, {0.3f, -0.2f, -1}, {1, 1, 1});
     const World world = make_world(scene, true);
     LostSamples lost;
-    return SingleScattering(world, 0, world.scene->media[0]).estimate(point_at(world, {0.3f, 0.2f, 9}, {0, 0, -1}),
-                                               Vec3(0.5f, 0, 1).normalized(), 4096, 1, 0, lost);
+    return SingleScattering(world, 0, world.scene->media[0])
+        .estimate(point_at(world, {0.3f, 0.2f, 9}, {0, 0, -1}), Vec3(0.5f, 0, 1).normalized(), 4096, 1, 0,
+                  lost);
   };
   const Rgb sheet = estimate(placed(make_rectangle(), 100, {0, 0, 0}));
   const Rgb block = estimate(placed(make_cube(), 100, {0, 0, -100}));
