@@ -167,11 +167,11 @@ Warnings check_density(const Scene& scene, const Cache& cache) {
     const double length = smallest_mean_free_path(medium);
     const double blotch = predict_blotch(spacing / length);
     if (blotch > kAcceptableBlotch)
-      warnings.push_back(
-          fmt::format("{}: the samples of {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
-                      "blotches of {:.1f} %; --spacing {:.3g} would serve",
-                      medium.place, medium_label(scene, m), spacing, spacing / length, 100 * blotch,
-                      kDefaultSpacing * length));
+      warnings.push_back(fmt::format(
+          "{}: the samples of {} are {:.3g} mm apart, {:.2g} mean free paths: expect "
+          "blotches of {}; --spacing {:.3g} would serve",
+          medium.place, medium_label(scene, m), spacing, spacing / length,
+          blotch > 1 ? "more than 100 %" : fmt::format("{:.1f} %", 100 * blotch), kDefaultSpacing * length));
   }
   return warnings;
 }

@@ -89,6 +89,8 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   const std::string place =
       (options.plan.empty() ? "--vary" : options.plan) + std::string(": point ") + std::to_string(index + 1);
   for (const Setting& setting : of_medium) apply_setting(point.material, setting, place);
+  if (!of_medium.empty() && max_channel(point.material.sigma_s + point.material.sigma_a) == 0)
+    fail(ErrorCode::kValue, place, "the medium neither scatters nor absorbs");
   if (!point.camera.empty()) find_camera(scene, point.camera, place);
   find_light_scales(scene, point.lights);
   return point;

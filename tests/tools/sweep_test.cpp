@@ -156,6 +156,7 @@ TEST_F(Sweep, RefusesWhatItCannotVary) {
   expect_refusal("--vary sigma_a=1:2:3 --shard 3/2", 2, "K/N");
   expect_refusal("--vary material=Marbel", 1, "Marble");
   expect_refusal("--vary eta=0.5:1:2", 1, "outside");
+  expect_refusal("--vary sigma_a=0 --vary sigma_s_prime=0", 1, "neither scatters nor absorbs");
   expect_refusal("--vary albedo=0.5:1.5:2", 1, "outside");
   expect_refusal("--vary camera=top", 1, "front");
   expect_refusal("--vary light.moon=1", 1, "moon");
