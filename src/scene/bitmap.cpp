@@ -8,6 +8,7 @@
 
 #include "nacre/base/file.h"
 #include "scene/bitmap_exr.h"
+#include "scene/hdr_guard.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -89,6 +90,7 @@ Bitmap decode_with_stb(const std::string& bytes, Format format, float gamma, con
   int width = 0, height = 0;
   const auto count = static_cast<std::size_t>(pixels);
   if (format == Format::kHdr) {
+    check_hdr_pixels(bytes, bitmap.width, bitmap.height, path);
     bitmap.texels =
         take_texels(stbi_loadf_from_memory(data, size, &width, &height, &channels, 3), count, path,
                     [&](float x) { return decode(x, gamma == kGammaOfFormat ? 1 : gamma); });
