@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <numeric>
-#include <ranges>
 
 #include "cache/light_planes.h"
 #include "cache/morton.h"
@@ -94,8 +93,14 @@ std::vector<OctreeNode> divide(const CacheGroup& group, const MortonCode& code_o
       for (std::uint32_t begin = first; begin < last;) {
         const auto octant_of = [&](std::uint32_t i) { return code_of(group.position(i)) >> shift; };
         const std::uint64_t octant = octant_of(begin);
-        const std::uint32_t end = *std::ranges::partition_point(
-            std::views::iota(begin, last), [&](std::uint32_t i) { return octant_of(i) == octant; });
+        std::uint32_t end = begin + 1;
+        for (std::uint32_t above = last; end < above;) {
+          const std::uint32_t middle = end + (above - end) / 2;
+          if (octant_of(middle) == octant)
+            end = middle + 1;
+          else
+            above = middle;
+        }
         OctreeNode child{};
         child.first_sample = begin;
         child.packed_counts = end - begin;
