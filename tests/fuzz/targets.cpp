@@ -42,10 +42,10 @@ void write_bytes(const std::string& path, const std::string& bytes) {
 void seal(const std::string& path) {
   std::string bytes = read_bytes(path);
   layout::Header header;
-  if (bytes.size() < sizeof header) return;
+  if (bytes.size() < sizeof header + sizeof(layout::SectionEntry)) return;
   std::memcpy(&header, bytes.data(), sizeof header);
-  std::vector<layout::SectionEntry> table(std::min<std::size_t>(
-      header.section_count, (bytes.size() - sizeof header) / sizeof(layout::SectionEntry)));
+  std::vector<layout::SectionEntry> table(std::clamp<std::size_t>(
+      header.section_count, 1, (bytes.size() - sizeof header) / sizeof(layout::SectionEntry)));
   const std::size_t table_bytes = table.size() * sizeof table[0];
   std::memcpy(table.data(), bytes.data() + sizeof header, table_bytes);
   for (layout::SectionEntry& entry : table)

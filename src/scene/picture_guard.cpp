@@ -1,5 +1,8 @@
-// Follows the runs without making pixels. Format: Ward 1991, "Real Pixels", and Radiance's filefmts.pdf.
-#include "scene/hdr_guard.h"
+// Follows lengths without making pixels. Formats: ISO/IEC 15948 (PNG); Ward 1991, "Real Pixels", and
+// Radiance's filefmts.pdf (HDR).
+#include "scene/picture_guard.h"
+
+#include <string_view>
 
 #include "nacre/base/error.h"
 
@@ -46,6 +49,21 @@ void follow_runs(Bytes& bytes, int width) {
 }
 
 }  // namespace
+
+void check_png_chunks(const std::string& bytes, const std::string& path) {
+  constexpr std::size_t kSignature = 8,
+                        kAround = 12;  // length and type before a chunk's data, checksum behind
+  for (std::size_t at = kSignature;;) {
+    if (bytes.size() - at < kAround) fail(ErrorCode::kSyntax, path, "truncated: its last part is missing");
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
+    if (length > bytes.size() - at - kAround)
+      fail(ErrorCode::kSyntax, path, "truncated or damaged: the part at byte {} says that it has {} bytes",
+           at, length);
+    if (std::string_view(bytes).substr(at + 4, 4) == "IEND") return;
+    at += kAround + length;
+  }
+}
 
 void check_hdr_pixels(const std::string& bytes, int width, int height, const std::string& path) {
   // After the first empty line and the line with the size.
