@@ -54,7 +54,7 @@ void check_png_chunks(const std::string& bytes, const std::string& path) {
   constexpr std::size_t kSignature = 8,
                         kAround = 12;  // length and type before a chunk's data, checksum behind
   for (std::size_t at = kSignature;;) {
-    if (bytes.size() - at < kAround) fail(ErrorCode::kSyntax, path, "truncated: its last part is missing");
+    if (bytes.size() < at + kAround) fail(ErrorCode::kSyntax, path, "truncated: its last part is missing");
     std::size_t length = 0;
     for (std::size_t i = 0; i < 4; ++i) length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
     if (length > bytes.size() - at - kAround)
