@@ -151,14 +151,14 @@ std::vector<Picture> find_missing(const Options& options, const FilmPlan& film, 
   return missing;
 }
 
-// The same for a frame of a film whatever else the command renders.
+// The same for a frame of a film whatever else the command renders, and wherever it writes.
 std::string describe_command(const Options& options, const Picture& picture, const Session& session) {
   if (!options.film.any()) return session.command();
-  return fmt::format("nacre render {}{}{} -o {} ({})", options.scene.path,
+  return fmt::format("nacre render {}{}{} ({})", options.scene.path,
                      options.cache.empty() ? "" : " --cache " + options.cache,
                      options.film.turntable > 0 ? fmt::format(" --turntable {}", options.film.turntable)
                                                 : " --camera-path " + options.film.camera_path,
-                     options.output, picture.label);
+                     picture.label);
 }
 
 void save_picture(const Image& image, const Picture& picture, const Options& options,
