@@ -189,9 +189,9 @@ void add_film_options(CLI::App& command, FilmOptions& options) {
                   "FIRST:LAST[:STEP] or one number: the frames of the film to render (default: all)")
       ->check(not_empty());
   command
-      .add_option(
-          "--contact-sheet", options.contact_sheet,
-          "A PNG of thumbnails of the film, once all of it is there; at one exposure, as previews are")
+      .add_option("--contact-sheet", options.contact_sheet,
+                  "A PNG of thumbnails of these frames; with --exposure auto of all, at one exposure, "
+                  "once they are there")
       ->check(not_empty());
 }
 

@@ -39,9 +39,8 @@ std::string describe_camera(const Camera& camera);
 /// two places.
 std::string frame_path(const std::string& output, int frame);
 
-/// Writes previews of the chosen frames, and the contact sheet, at `exposure`; or, without one, at the lowest
-/// that suits any frame, previews of all. The sheet, and what suits all, wait until all `frames` are
-/// complete.
+/// Writes previews of the chosen frames, if `png`, and a contact sheet of them, if wanted, at `exposure`.
+/// Without one, of all `frames` of the film at the lowest that suits one of them, once all are complete.
 void show_film(const FilmOptions& options, const FilmPlan& film, const std::vector<Picture>& frames, bool png,
                std::optional<double> exposure, Session& session);
 

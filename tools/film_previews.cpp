@@ -1,5 +1,6 @@
 // What shows a film: previews and a contact sheet, at one exposure.
 #include <mutex>
+#include <numeric>
 
 #include "contact_sheet.h"
 #include "film.h"
@@ -24,56 +25,46 @@ double lowest_exposure(const std::vector<Picture>& frames) {
   return lowest;
 }
 
-// Of frames at equal distances, where there are many.
-void save_contact_sheet(const std::string& path, const FilmPlan& film, const std::vector<Picture>& frames,
-                        double exposure) {
-  const std::size_t step = (frames.size() + kMostThumbnails - 1) / kMostThumbnails;
-  std::vector<SheetPicture> pictures((frames.size() + step - 1) / step);
-  parallel_for(pictures.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      pictures[i] = {frames[i * step].preview,
-                     {{"frame", fmt::format("{}", film.first + static_cast<int>(i * step))}},
-                     make_preview(shrink(load_exr(frames[i * step].path), kThumbnailEdge), path, exposure)};
-  });
-  const std::vector<std::uint8_t> bytes = encode_png(make_contact_sheet({}, pictures), path);
-  AtomicFile file(path);
-  file.write(bytes.data(), bytes.size());
-  file.commit();
-}
-
 }  // namespace
 
 void show_film(const FilmOptions& options, const FilmPlan& film, const std::vector<Picture>& frames, bool png,
                std::optional<double> exposure, Session& session) {
-  const bool sheet = !options.contact_sheet.empty();
-  if (!png && !sheet) return;
+  if (!png && options.contact_sheet.empty()) return;
   const StageTimer timer(session.report(), "write_image");
-  std::vector<const Picture*> shown;
-  if (exposure)
-    for (const int frame : film.chosen)
-      shown.push_back(&frames[static_cast<std::size_t>(frame - film.first)]);
-  else
-    for (const Picture& frame : frames) shown.push_back(&frame);
-  const bool whole = (exposure && !sheet) || std::ranges::all_of(frames, is_complete);
-  if (whole && !exposure) exposure = lowest_exposure(frames);
-  if (png && exposure) {
-    parallel_for(shown.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        save_png(load_exr(shown[i]->path), shown[i]->preview, *exposure);
-    });
-    session.progress().say(
-        fmt::format("{} previews, {} to {}", shown.size(), shown.front()->preview, shown.back()->preview));
+  std::vector<int> shown = film.chosen;
+  if (!exposure) {
+    if (!std::ranges::all_of(frames, is_complete)) {
+      session.progress().say("what shows the film at one --exposure auto comes with the last of its frames");
+      return;
+    }
+    exposure = lowest_exposure(frames);
+    shown.resize(frames.size());
+    std::iota(shown.begin(), shown.end(), film.first);
   }
-  if (!whole) {
-    session.progress().say(fmt::format("{} to come once all frames of the film are there",
-                                       exposure ? "the contact sheet is"
-                                       : sheet  ? "previews and the contact sheet are"
-                                                : "previews are"));
-    return;
-  }
-  if (!sheet) return;
-  save_contact_sheet(options.contact_sheet, film, frames, *exposure);
-  session.progress().say(options.contact_sheet);
+  // Of many frames the sheet has some, at equal distances.
+  const std::size_t step = (shown.size() + kMostThumbnails - 1) / kMostThumbnails;
+  std::vector<SheetPicture> sheet((shown.size() + step - 1) / step);
+  parallel_for(shown.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Picture& frame = frames[static_cast<std::size_t>(shown[i] - film.first)];
+      const Image image = load_exr(frame.path);
+      if (png) save_png(image, frame.preview, *exposure);
+      if (i % step == 0)
+        sheet[i / step] = {frame.preview,
+                           {{"frame", fmt::format("{}", shown[i])}},
+                           make_preview(shrink(image, kThumbnailEdge), frame.path, *exposure)};
+    }
+  });
+  if (png)
+    session.progress().say(fmt::format("{} previews, {} to {}", shown.size(), sheet.front().file,
+                                       frames[static_cast<std::size_t>(shown.back() - film.first)].preview));
+  if (options.contact_sheet.empty()) return;
+  const std::string& path = options.contact_sheet;
+  const std::vector<std::uint8_t> bytes = encode_png(make_contact_sheet({}, sheet), path);
+  AtomicFile file(path);
+  file.write(bytes.data(), bytes.size());
+  file.commit();
+  session.progress().say(path);
 }
 
 }  // namespace nacre::tools

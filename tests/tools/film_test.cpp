@@ -132,9 +132,10 @@ TEST_F(FilmCommand, PreviewsShareOneExposure) {
   }
   EXPECT_GT(bytes("sheet.png").size(), 1000u);
   // With an exposure that is given nothing has to wait for other frames.
-  film("--turntable 9 --png --exposure 1 -o u.exr --quiet --frames 4");
+  film("--turntable 9 --png --exposure 1 -o u.exr --quiet --frames 4 --contact-sheet u.png");
   save_png(load_exr(folder_.file("u.0004.exr")), folder_.file("expected.png"), 1);
   EXPECT_EQ(bytes("u.0004.png"), bytes("expected.png"));
+  EXPECT_LT(bytes("u.png").size(), bytes("sheet.png").size());
 }
 
 TEST_F(FilmCommand, RefusesWhatIsNoFilm) {
