@@ -11,7 +11,7 @@
 #include "nacre/base/version.h"
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/fingerprint.h"
-#include "render_options.h"
+#include "picture.h"
 #include "sweep_record.h"
 
 namespace nacre::tools {
@@ -94,28 +94,6 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   if (!point.camera.empty()) find_camera(scene, point.camera, place);
   find_light_scales(scene, point.lights);
   return point;
-}
-
-// All that a picture depends on, but for its own settings.
-KeyValues make_conditions(const Options& options, const Scene& scene, const Cache& cache) {
-  KeyValues conditions =
-      make_fingerprint(scene, fingerprint_conditions(cache.fingerprint, scene.media.size()));
-  for (const CacheGroup& group : cache.groups) conditions.emplace_back("samples", samples_digest(group));
-  const RenderParams params = make_render_params(options, scene, options.camera);
-  const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
-  add("nacre", kVersion);
-  add("scene", bytes_digest(read_text_file(options.scene.path)));
-  for (const std::string& define : options.scene.defines) add("define", define);
-  add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));
-  add("picture", fmt::format("{} {} {} {} {} {} {}", params.width, params.height, params.crop_x,
-                             params.crop_y, params.crop_width, params.crop_height, params.samples_per_pixel));
-  add("method",
-      fmt::format("{} {} {} {}", options.method, params.tolerance, params.certified, params.single_samples));
-  add("channels", options.aovs);
-  add("seed", fmt::format("{}", params.seed));
-  add("shadows", options.bake.no_shadows ? "no" : "yes");
-  add("medium", options.medium);
-  return conditions;
 }
 
 std::string make_key(KeyValues conditions, const Point& point) {
@@ -314,8 +292,10 @@ void run(const Options& options, const std::string& command_line) {
   const std::size_t medium = find_medium(scene, options.medium, of_medium);
   const KeyValues conditions = [&] {
     const StageTimer timer(session.report(), "read_cache");
-    const Cache cache = load_cache(options.cache);
-    return make_conditions(options, scene, cache);
+    KeyValues result = make_conditions(options, make_render_params(options, scene, options.camera), scene,
+                                       load_cache(options.cache));
+    result.emplace_back("medium", options.medium);
+    return result;
   }();
   std::vector<Point> points;
   for (std::size_t i = 0; i < plan.points.size(); ++i) {
