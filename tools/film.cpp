@@ -29,7 +29,7 @@ std::vector<int> parse_frames(const std::string& text, const FilmPlan& film) {
   if (first < film.first || last > film.last)
     throw UsageError(fmt::format("--frames {}: the film has frames {} to {}", text, film.first, film.last));
   std::vector<int> frames;
-  for (int frame = first; frame <= last; frame += step) frames.push_back(frame);
+  for (std::int64_t frame = first; frame <= last; frame += step) frames.push_back(static_cast<int>(frame));
   return frames;
 }
 

@@ -89,6 +89,13 @@ std::vector<Picture> plan_frames(const Options& options, const FilmPlan& film) {
   return frames;
 }
 
+// The frames that are asked for.
+std::vector<Picture> choose(const FilmPlan& film, const std::vector<Picture>& frames) {
+  std::vector<Picture> chosen;
+  for (const int frame : film.chosen) chosen.push_back(frames[static_cast<std::size_t>(frame - film.first)]);
+  return chosen;
+}
+
 // Fails if what is to be written cannot be.
 void check_outputs(const Options& options, const std::vector<Picture>& pictures) {
   std::vector<std::string> inputs{options.scene.path, options.cache, options.film.camera_path};
@@ -130,7 +137,7 @@ void set_params(const Options& options, const std::optional<FilmPlan>& film, Sce
   }
 }
 
-// The chosen frames that are not there yet.
+// Those that are asked for and not there yet; all of them get their keys.
 std::vector<Picture> find_missing(const Options& options, const FilmPlan& film, const Scene& scene,
                                   const Cache& cache, std::vector<Picture>& frames, Session& session) {
   const StageTimer timer(session.report(), "read_cache");
@@ -141,11 +148,8 @@ std::vector<Picture> find_missing(const Options& options, const FilmPlan& film, 
     for (const std::string& light : options.lights) key.emplace_back("light", light);
     frame.key = fingerprint_digest(key);
   }
-  std::vector<Picture> missing;
-  for (const int number : film.chosen) {
-    const Picture& frame = frames[static_cast<std::size_t>(number - film.first)];
-    if (!is_complete(frame)) missing.push_back(frame);
-  }
+  std::vector<Picture> missing = choose(film, frames);
+  std::erase_if(missing, is_complete);
   session.progress().say(fmt::format("{} of {} frames to render{}", missing.size(), film.chosen.size(),
                                      film.chosen.size() > missing.size() ? ", the others are there" : ""));
   return missing;
@@ -234,7 +238,7 @@ void run(const Options& options, const std::string& command_line) {
   const std::optional<FilmPlan> film =
       options.film.any() ? std::optional(plan_film(options.film)) : std::nullopt;
   std::vector<Picture> pictures = film ? plan_frames(options, *film) : plan_pictures(options);
-  check_outputs(options, pictures);
+  check_outputs(options, film ? choose(*film, pictures) : pictures);
 
   Scene scene = load_scene(options.scene, session);
   const std::vector<Rgb> light_scales = find_light_scales(scene, options.lights);
