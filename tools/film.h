@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nacre/scene/camera_motion.h"
+#include "camera_path.h"
 #include "picture.h"
 
 namespace nacre::tools {
@@ -25,9 +25,6 @@ struct FilmPlan {
 /// Throws UsageError for frames that the film does not have and options that do not go together; what
 /// load_camera_path throws.
 FilmPlan plan_film(const FilmOptions& options);
-/// A list of key frames: [{"frame": 1, "origin": [x, y, z], "target": [x, y, z], "up": [0, 1, 0], "fov": 30},
-/// ...], up and fov where wanted. Throws Error with `path` and the line or the key.
-std::vector<CameraKey> load_camera_path(const std::string& path);
 /// The scene's camera at every frame. Throws Error(kValue) for one at which it looks nowhere.
 std::vector<Camera> make_film_cameras(const FilmOptions& options, const FilmPlan& film, const Scene& scene,
                                       std::size_t camera);

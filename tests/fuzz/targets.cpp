@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cache/section_file.h"
+#include "camera_path.h"
 #include "geometry/serialized_bytes.h"
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/exitance_file.h"
@@ -94,6 +95,7 @@ constexpr std::array kTargets{
     FuzzTarget{"bitmap", ".hdr", [](const std::string& path) { load_bitmap(path, path); }},
     FuzzTarget{"plan_csv", ".csv", [](const std::string& path) { tools::load_plan(path); }},
     FuzzTarget{"plan_json", ".json", [](const std::string& path) { tools::load_plan(path); }},
+    FuzzTarget{"camera_path", ".json", [](const std::string& path) { tools::load_camera_path(path); }},
 };
 
 }  // namespace

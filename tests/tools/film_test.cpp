@@ -162,6 +162,7 @@ TEST_F(FilmCommand, RefusesWhatIsNoFilm) {
   path(R"([{"frame": 1.5, "origin": [0, 0, 9], "target": [0, 0, 0]}])", "key frame 1", "whole number");
   path(R"([{"frame": 1, "origin": [0, 9], "target": [0, 0, 0]}])", "key frame 1", "three numbers");
   path(R"([{"frame": 1, "origin": [0, 0, 1e300], "target": [0, 0, 0]}])", "key frame 1", "three numbers");
+  path(R"([{"frame": 1, "origin": [0, 0, 1e999], "target": [0, 0, 0]}])", "p.json", "too large");
   path(R"([{"frame": 1, "origin": [0, 0, 9], "target": [0, 0, 9]}])", "key frame 1", "have to differ");
   path(R"([{"frame": 1, "origin": [0, 9, 0], "target": [0, 0, 0]}])", "key frame 1", "up must not");
   path(R"([{"frame": 1, "origin": [0, 0, 9], "target": [0, 0, 0], "fov": 180}])", "key frame 1", "fov 180");
