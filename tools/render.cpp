@@ -9,13 +9,14 @@
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
-#include "render_options.h"
+#include "nacre/render/merge_images.h"
+#include "picture.h"
 
 namespace nacre::tools {
 namespace {
 
 struct Options : RenderOptions {
-  std::string output, exitance;
+  std::string output, exitance, tile;
   std::vector<std::string> cameras;
   int verify = 0;
   bool png = false;
@@ -24,6 +25,8 @@ struct Options : RenderOptions {
 // Options that have nothing to act on are mistakes.
 void check_combination(const Options& options) {
   check_render_options(options);
+  if (!options.tile.empty() && !options.crop.empty())
+    throw UsageError("--tile and --crop both choose a part of the picture; give one");
   const Method method = method_of(options);
   if (options.verify > 0 && method != Method::kHierarchical)
     throw UsageError("--verify measures --method hierarchical; " + options.method + " has no such error");
@@ -88,6 +91,16 @@ std::vector<Picture> plan_pictures(const Options& options) {
   return pictures;
 }
 
+// Of all that a part of a picture depends on but which part it is.
+std::string settings_digest(const Options& options, RenderParams params, const Scene& scene,
+                            const Cache& cache) {
+  params.crop_x = params.crop_y = params.crop_width = params.crop_height = 0;
+  KeyValues conditions = make_conditions(options, params, scene, cache);
+  for (const std::string& light : options.lights) conditions.emplace_back("light", light);
+  conditions.emplace_back("camera", scene.cameras[params.camera].id);
+  return fingerprint_digest(conditions);
+}
+
 void save_picture(const Image& image, const Picture& picture, const Options& options,
                   std::optional<double> exposure, Session& session) {
   const StageTimer timer(session.report(), "write_image");
@@ -128,7 +141,7 @@ void run(const Options& options, const std::string& command_line) {
   const std::vector<Rgb> light_scales = find_light_scales(scene, options.lights);
   std::vector<RenderParams> params;
   for (const Picture& picture : pictures)
-    params.push_back(make_render_params(options, scene, picture.camera));
+    params.push_back(make_render_params(options, scene, picture.camera, parse_share(options.tile, "--tile")));
   BakeParams bake_params = options.bake.params(options.common);
   bake_params.fixed_eta = true;  // what is not kept serves this scene alone
   session.warn(check_single_scattering(scene, options));
@@ -162,6 +175,8 @@ void run(const Options& options, const std::string& command_line) {
                       {"nacre:command", command_line},
                       {"nacre:seed", fmt::format("{}", options.common.seed)},
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
+    if (image.width < image.full_width || image.height < image.full_height)
+      image.metadata[kSettingsKey] = settings_digest(options, params[i], scene, cache);
     save_picture(image, pictures[i], options, exposure, session);
     // After each picture that adds to it: a run of many may be interrupted.
     if (const std::size_t nodes = renderer.filled_node_count();
@@ -195,6 +210,9 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->check(not_empty())
       ->delimiter(',')
       ->allow_extra_args(false);
+  command->add_option(
+      "--tile", options->tile,
+      "K/N: render the K-th of N bands of the picture only; `nacre merge` puts them together");
   command->add_option("--exitance", options->exitance,
                       "Keep the diffusion that is evaluated in this file, and take it from there next time");
   command

@@ -4,15 +4,16 @@ set -euo pipefail
 
 usage() {
   cat <<'END'
-usage: tools/setup.sh
+usage: tools/setup.sh [--tests]
 
-Installs what is missing of the Debian 12 packages that nacre needs; needs root or sudo only then.
+Installs what is missing of the Debian 12 packages that nacre needs; needs root or sudo only then. --tests
+adds what only tests use: without it, those that need it are skipped.
 npm, which fetches the meshes of the example scenes, is installed only if it and the meshes are missing.
 END
 }
 
 case "${1:-}" in
-  "") ;;
+  "" | --tests) ;;
   -h | --help) usage; exit 0 ;;
   *) usage >&2; exit 2 ;;
 esac
@@ -23,6 +24,9 @@ packages=(
   libpugixml-dev libcli11-dev nlohmann-json3-dev libfmt-dev zlib1g-dev libxxhash-dev libstb-dev libgtest-dev
   libbenchmark-dev
 )
+if [[ "${1:-}" == --tests ]]; then
+  packages+=(slurmctld slurmd slurm-client munge)
+fi
 
 # Those of the named packages that are not installed, one a line.
 missing() {

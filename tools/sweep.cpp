@@ -11,8 +11,9 @@
 #include "nacre/base/version.h"
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/fingerprint.h"
-#include "render_options.h"
+#include "picture.h"
 #include "sweep_record.h"
+#include "sweep_slurm.h"
 
 namespace nacre::tools {
 namespace {
@@ -24,6 +25,7 @@ constexpr int kThumbnailEdge = 256;
 struct Options : RenderOptions {
   std::vector<std::string> vary;
   std::string plan, medium, camera, output, shard;
+  EngineOptions engine;
   bool zip = false;
 };
 
@@ -37,16 +39,6 @@ struct Point {
   std::string key;
 };
 
-// "K/N"
-std::array<std::size_t, 2> parse_shard(const std::string& text) {
-  if (text.empty()) return {1, 1};
-  int k = 0, n = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%c", &k, &n, &rest) != 2 || k < 1 || n < k)
-    throw UsageError("--shard " + text + ": write it as K/N, K from 1 to N");
-  return {static_cast<std::size_t>(k), static_cast<std::size_t>(n)};
-}
-
 void check_options(const Options& options) {
   check_render_options(options);
   if (options.vary.empty() == options.plan.empty())
@@ -54,6 +46,9 @@ void check_options(const Options& options) {
   if (options.zip && options.vary.size() < 2) throw UsageError("--zip walks several --vary together");
   if (!uses_cache(method_of(options)))
     throw UsageError("--method " + options.method + ": a sweep is made from a cache");
+  if (options.engine.uses_slurm() && !options.shard.empty())
+    throw UsageError("--shard K/N is for one machine; --engine slurm gives every job its own");
+  check_engine_options(options.engine);
 }
 
 std::size_t find_medium(const Scene& scene, const std::string& id, bool needed) {
@@ -94,28 +89,6 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   if (!point.camera.empty()) find_camera(scene, point.camera, place);
   find_light_scales(scene, point.lights);
   return point;
-}
-
-// All that a picture depends on, but for its own settings.
-KeyValues make_conditions(const Options& options, const Scene& scene, const Cache& cache) {
-  KeyValues conditions =
-      make_fingerprint(scene, fingerprint_conditions(cache.fingerprint, scene.media.size()));
-  for (const CacheGroup& group : cache.groups) conditions.emplace_back("samples", samples_digest(group));
-  const RenderParams params = make_render_params(options, scene, options.camera);
-  const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
-  add("nacre", kVersion);
-  add("scene", bytes_digest(read_text_file(options.scene.path)));
-  for (const std::string& define : options.scene.defines) add("define", define);
-  add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));
-  add("picture", fmt::format("{} {} {} {} {} {} {}", params.width, params.height, params.crop_x,
-                             params.crop_y, params.crop_width, params.crop_height, params.samples_per_pixel));
-  add("method",
-      fmt::format("{} {} {} {}", options.method, params.tolerance, params.certified, params.single_samples));
-  add("channels", options.aovs);
-  add("seed", fmt::format("{}", params.seed));
-  add("shadows", options.bake.no_shadows ? "no" : "yes");
-  add("medium", options.medium);
-  return conditions;
 }
 
 std::string make_key(KeyValues conditions, const Point& point) {
@@ -291,16 +264,22 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
   session.progress().say(options.output + "/manifest.json, contact_sheet.png and index.html");
 }
 
+std::vector<std::string> keys_of(const std::vector<Point>& points) {
+  std::vector<std::string> keys;
+  for (const Point& point : points) keys.push_back(point.key);
+  return keys;
+}
+
 void make_folders(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder + "/points", error);
   if (error) fail(ErrorCode::kIo, folder, "the folder cannot be made: {}", error.message());
 }
 
-void run(const Options& options, const std::string& command_line) {
+void run(const Options& options, const CLI::App& command, const std::string& command_line) {
   check_options(options);
   const std::optional<double> exposure = parse_exposure(options.exposure);
-  const auto [shard, shards] = parse_shard(options.shard);
+  const auto [shard, shards] = parse_share(options.shard, "--shard");
   const SweepPlan plan =
       options.plan.empty() ? make_plan(options.vary, options.zip) : load_plan(options.plan);
   Session session(options.common, command_line);
@@ -314,8 +293,10 @@ void run(const Options& options, const std::string& command_line) {
   const std::size_t medium = find_medium(scene, options.medium, of_medium);
   const KeyValues conditions = [&] {
     const StageTimer timer(session.report(), "read_cache");
-    const Cache cache = load_cache(options.cache);
-    return make_conditions(options, scene, cache);
+    KeyValues result = make_conditions(options, make_render_params(options, scene, options.camera), scene,
+                                       load_cache(options.cache));
+    result.emplace_back("medium", options.medium);
+    return result;
   }();
   std::vector<Point> points;
   for (std::size_t i = 0; i < plan.points.size(); ++i) {
@@ -334,7 +315,16 @@ void run(const Options& options, const std::string& command_line) {
   session.progress().say(fmt::format(
       "{} of {} pictures to render{}", pending.size(), points.size(),
       own > pending.size() ? fmt::format(", {} are there", own - pending.size()) : std::string()));
-  if (!pending.empty()) render_points(options, scene, medium, pending, session);
+  if (!pending.empty()) {
+    const std::string manifest = options.output + "/manifest.json";
+    std::filesystem::remove(manifest);  // it speaks of pictures that will be others
+    if (options.engine.uses_slurm()) {
+      run_on_slurm({find_words(command), options.output, keys_of(points)}, options.engine, session);
+      if (std::filesystem::exists(manifest)) return session.finish();  // else the job that merges failed
+    } else {
+      render_points(options, scene, medium, pending, session);
+    }
+  }
 
   std::vector<SweepRecord> records;
   for (const Point& point : points)
@@ -375,7 +365,8 @@ void add_sweep_command(CLI::App& app, const std::string& command_line) {
   command->get_option("--cache")->required();
   command->add_flag("--no-shadows", options->bake.no_shadows, "As the cache was baked");
   add_common_options(*command, options->common);
-  command->callback([options, command_line] { run(*options, command_line); });
+  add_engine_options(*command, options->engine);
+  command->callback([options, command, command_line] { run(*options, *command, command_line); });
 }
 
 }  // namespace nacre::tools

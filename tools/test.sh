@@ -17,7 +17,7 @@ esac
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
-tools/setup.sh
+tools/setup.sh --tests
 status=0
 tools/fetch_meshes.sh || status=$?
 if ((status == 3)); then

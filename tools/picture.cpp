@@ -1,0 +1,37 @@
+// Named values for all that changes a pixel.
+#include "picture.h"
+
+#include "nacre/base/file.h"
+#include "nacre/base/simd.h"
+#include "nacre/base/version.h"
+#include "nacre/cache/fingerprint.h"
+#include "nacre/geometry/mesh_file.h"
+
+namespace nacre::tools {
+
+KeyValues make_conditions(const RenderOptions& options, const RenderParams& params, const Scene& scene,
+                          const Cache& cache) {
+  KeyValues conditions =
+      make_fingerprint(scene, fingerprint_conditions(cache.fingerprint, scene.media.size()));
+  for (const CacheGroup& group : cache.groups) conditions.emplace_back("samples", samples_digest(group));
+  const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
+  add("nacre", kVersion);
+  if (!is_mesh_file_name(options.scene.path)) add("scene", bytes_digest(read_text_file(options.scene.path)));
+  for (const std::string& define : options.scene.defines) add("define", define);
+  add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));
+  add("picture", fmt::format("{} {} {} {} {} {} {}", params.width, params.height, params.crop_x,
+                             params.crop_y, params.crop_width, params.crop_height, params.samples_per_pixel));
+  add("method", fmt::format("{} {} {} {} {} {}", options.method, params.tolerance, params.certified,
+                            params.single_samples, params.mc_samples, static_cast<int>(params.mc_sampling)));
+  add("channels", options.aovs);
+  add("seed", fmt::format("{}", params.seed));
+  const BakeOptions& bake = options.bake;
+  add("bake", fmt::format("{} {} {} {} {} {}", bake.points.value_or(0), bake.spacing.value_or(0),
+                          bake.irradiance_samples.value_or(0), bake.bounces.value_or(-1), bake.interreflect,
+                          bake.irradiance_error.value_or(0)));
+  add("shadows", bake.no_shadows ? "no" : "yes");
+  add("simd", simd_target());
+  return conditions;
+}
+
+}  // namespace nacre::tools
