@@ -98,6 +98,7 @@ void add_bake_command(CLI::App& app, const std::string& command_line);
 void add_render_command(CLI::App& app, const std::string& command_line);
 void add_sweep_command(CLI::App& app, const std::string& command_line);
 void add_info_command(CLI::App& app, const std::string& command_line);
+void add_merge_command(CLI::App& app, const std::string& command_line);
 void add_diff_command(CLI::App& app, const std::string& command_line);
 void add_materials_command(CLI::App& app, const std::string& command_line);
 void add_export_commands(CLI::App& app, const std::string& command_line);

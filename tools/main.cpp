@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
   nacre::tools::add_render_command(app, line);
   nacre::tools::add_sweep_command(app, line);
   nacre::tools::add_info_command(app, line);
+  nacre::tools::add_merge_command(app, line);
   nacre::tools::add_diff_command(app, line);
   nacre::tools::add_materials_command(app, line);
   nacre::tools::add_export_commands(app, line);

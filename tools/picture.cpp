@@ -7,6 +7,7 @@
 #include "nacre/base/simd.h"
 #include "nacre/base/version.h"
 #include "nacre/cache/fingerprint.h"
+#include "nacre/geometry/mesh_file.h"
 
 namespace nacre::tools {
 
@@ -17,7 +18,7 @@ KeyValues make_conditions(const RenderOptions& options, const RenderParams& para
   for (const CacheGroup& group : cache.groups) conditions.emplace_back("samples", samples_digest(group));
   const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
   add("nacre", kVersion);
-  add("scene", bytes_digest(read_text_file(options.scene.path)));
+  if (!is_mesh_file_name(options.scene.path)) add("scene", bytes_digest(read_text_file(options.scene.path)));
   for (const std::string& define : options.scene.defines) add("define", define);
   add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));
   add("picture", fmt::format("{} {} {} {} {} {} {}", params.width, params.height, params.crop_x,

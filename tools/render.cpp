@@ -10,12 +10,13 @@
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
+#include "nacre/render/merge_images.h"
 
 namespace nacre::tools {
 namespace {
 
 struct Options : RenderOptions {
-  std::string output, exitance;
+  std::string output, exitance, tile;
   std::vector<std::string> cameras;
   FilmOptions film;
   int verify = 0;
@@ -25,6 +26,8 @@ struct Options : RenderOptions {
 // Options that have nothing to act on are mistakes.
 void check_combination(const Options& options) {
   check_render_options(options);
+  if (!options.tile.empty() && !options.crop.empty())
+    throw UsageError("--tile and --crop both choose a part of the picture; give one");
   const Method method = method_of(options);
   if (options.verify > 0 && method != Method::kHierarchical)
     throw UsageError("--verify measures --method hierarchical; " + options.method + " has no such error");
@@ -121,7 +124,8 @@ void check_outputs(const Options& options, const std::vector<Picture>& pictures)
 void set_params(const Options& options, const std::optional<FilmPlan>& film, Scene& scene,
                 std::vector<Picture>& pictures) {
   const auto params_of = [&](std::size_t i) {
-    return make_render_params(options, scene, options.cameras.empty() ? "" : options.cameras[i]);
+    return make_render_params(options, scene, options.cameras.empty() ? "" : options.cameras[i],
+                              parse_share(options.tile, "--tile"));
   };
   if (!film) {
     for (std::size_t i = 0; i < pictures.size(); ++i) pictures[i].params = params_of(i);
@@ -163,6 +167,16 @@ std::string describe_command(const Options& options, const Picture& picture, con
                      options.film.turntable > 0 ? fmt::format(" --turntable {}", options.film.turntable)
                                                 : " --camera-path " + options.film.camera_path,
                      picture.label);
+}
+
+// Of all that a part of a picture depends on but which part it is.
+std::string settings_digest(const Options& options, RenderParams params, const Scene& scene,
+                            const Cache& cache) {
+  params.crop_x = params.crop_y = params.crop_width = params.crop_height = 0;
+  KeyValues conditions = make_conditions(options, params, scene, cache);
+  for (const std::string& light : options.lights) conditions.emplace_back("light", light);
+  conditions.emplace_back("camera", describe_camera(scene.cameras[params.camera]));
+  return fingerprint_digest(conditions);
 }
 
 void save_picture(const Image& image, const Picture& picture, const Options& options,
@@ -213,6 +227,8 @@ void render_pictures(const Options& options, const std::vector<Picture>& picture
                       {"nacre:seed", fmt::format("{}", options.common.seed)},
                       {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
     if (!picture.key.empty()) image.metadata[kKeyAttribute] = picture.key;
+    if (image.width < image.full_width || image.height < image.full_height)
+      image.metadata[kSettingsKey] = settings_digest(options, picture.params, *world.scene, cache);
     save_picture(image, picture, options, exposure, session);
     // After each picture that adds to it: a run of many may be interrupted.
     if (const std::size_t nodes = renderer.filled_node_count();
@@ -288,6 +304,9 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->check(not_empty())
       ->delimiter(',')
       ->allow_extra_args(false);
+  command->add_option(
+      "--tile", options->tile,
+      "K/N: render the K-th of N bands of the picture only; `nacre merge` puts them together");
   command->add_option("--exitance", options->exitance,
                       "Keep the diffusion that is evaluated in this file, and take it from there next time");
   command

@@ -59,13 +59,31 @@ void parse_crop(const std::string& text, RenderParams& params) {
   params.crop_height = size[1];
 }
 
+void choose_band(Share tile, RenderParams& params) {
+  const auto height = static_cast<std::size_t>(params.height);
+  if (tile.n > height)
+    throw UsageError(fmt::format("--tile {}/{}: the picture has {} rows", tile.k, tile.n, height));
+  params.crop_y = static_cast<int>(height * (tile.k - 1) / tile.n);
+  params.crop_height = static_cast<int>(height * tile.k / tile.n) - params.crop_y;
+}
+
 }  // namespace
 
 Method method_of(const RenderOptions& options) {
   return static_cast<Method>(std::find(kMethods.begin(), kMethods.end(), options.method) - kMethods.begin());
 }
 
-RenderParams make_render_params(const RenderOptions& options, const Scene& scene, const std::string& id) {
+Share parse_share(const std::string& text, const std::string& option) {
+  if (text.empty()) return {};
+  int k = 0, n = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%d/%d%c", &k, &n, &rest) != 2 || k < 1 || n < k)
+    throw UsageError(option + " " + text + ": write it as K/N, K from 1 to N");
+  return {static_cast<std::size_t>(k), static_cast<std::size_t>(n)};
+}
+
+RenderParams make_render_params(const RenderOptions& options, const Scene& scene, const std::string& id,
+                                Share tile) {
   const std::size_t camera = id.empty() ? 0 : find_camera(scene, id, "--camera");
   RenderParams params = default_render_params(scene, camera);
   if (!options.size.empty()) {
@@ -74,8 +92,9 @@ RenderParams make_render_params(const RenderOptions& options, const Scene& scene
     params.height = params.crop_height = size[1];
   }
   if (!options.crop.empty()) parse_crop(options.crop, params);
+  if (tile.n > 1) choose_band(tile, params);
   if (std::int64_t{params.crop_width} * params.crop_height > (std::int64_t{1} << 28))
-    throw UsageError("the picture has more than 2^28 pixels; render it in parts with --crop");
+    throw UsageError("the picture has more than 2^28 pixels; render it in parts with --tile or --crop");
   if (options.samples_per_pixel > 0) params.samples_per_pixel = options.samples_per_pixel;
   params.method = method_of(options);
   if (options.tolerance) params.tolerance = *options.tolerance;

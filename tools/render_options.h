@@ -26,9 +26,16 @@ struct RenderOptions {
 /// All but the common ones, those of scenes and of bakes.
 void add_render_options(CLI::App& command, RenderOptions& options);
 Method method_of(const RenderOptions& options);
-/// Of the camera with that id, or the first. Throws UsageError for a size, crop or list of channels that
-/// cannot be read; what find_camera throws.
-RenderParams make_render_params(const RenderOptions& options, const Scene& scene, const std::string& camera);
+/// The K-th of N.
+struct Share {
+  std::size_t k = 1, n = 1;
+};
+/// "K/N"; "" is the whole. Throws UsageError, which names `option`.
+Share parse_share(const std::string& text, const std::string& option);
+/// Of the camera with that id, or the first; of its picture the K-th of N bands from the top. Throws
+/// UsageError for a size, crop, band or list of channels that cannot be read; what find_camera throws.
+RenderParams make_render_params(const RenderOptions& options, const Scene& scene, const std::string& camera,
+                                Share tile = {});
 /// Stops, or none for "auto". Throws UsageError.
 std::optional<double> parse_exposure(const std::string& text);
 /// Throws UsageError where an option has nothing to act on.

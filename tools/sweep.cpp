@@ -13,6 +13,7 @@
 #include "nacre/cache/fingerprint.h"
 #include "picture.h"
 #include "sweep_record.h"
+#include "sweep_slurm.h"
 
 namespace nacre::tools {
 namespace {
@@ -24,6 +25,7 @@ constexpr int kThumbnailEdge = 256;
 struct Options : RenderOptions {
   std::vector<std::string> vary;
   std::string plan, medium, camera, output, shard;
+  EngineOptions engine;
   bool zip = false;
 };
 
@@ -37,16 +39,6 @@ struct Point {
   std::string key;
 };
 
-// "K/N"
-std::array<std::size_t, 2> parse_shard(const std::string& text) {
-  if (text.empty()) return {1, 1};
-  int k = 0, n = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%c", &k, &n, &rest) != 2 || k < 1 || n < k)
-    throw UsageError("--shard " + text + ": write it as K/N, K from 1 to N");
-  return {static_cast<std::size_t>(k), static_cast<std::size_t>(n)};
-}
-
 void check_options(const Options& options) {
   check_render_options(options);
   if (options.vary.empty() == options.plan.empty())
@@ -54,6 +46,9 @@ void check_options(const Options& options) {
   if (options.zip && options.vary.size() < 2) throw UsageError("--zip walks several --vary together");
   if (!uses_cache(method_of(options)))
     throw UsageError("--method " + options.method + ": a sweep is made from a cache");
+  if (options.engine.uses_slurm() && !options.shard.empty())
+    throw UsageError("--shard K/N is for one machine; --engine slurm gives every job its own");
+  check_engine_options(options.engine);
 }
 
 std::size_t find_medium(const Scene& scene, const std::string& id, bool needed) {
@@ -269,16 +264,22 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
   session.progress().say(options.output + "/manifest.json, contact_sheet.png and index.html");
 }
 
+std::vector<std::string> keys_of(const std::vector<Point>& points) {
+  std::vector<std::string> keys;
+  for (const Point& point : points) keys.push_back(point.key);
+  return keys;
+}
+
 void make_folders(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder + "/points", error);
   if (error) fail(ErrorCode::kIo, folder, "the folder cannot be made: {}", error.message());
 }
 
-void run(const Options& options, const std::string& command_line) {
+void run(const Options& options, const CLI::App& command, const std::string& command_line) {
   check_options(options);
   const std::optional<double> exposure = parse_exposure(options.exposure);
-  const auto [shard, shards] = parse_shard(options.shard);
+  const auto [shard, shards] = parse_share(options.shard, "--shard");
   const SweepPlan plan =
       options.plan.empty() ? make_plan(options.vary, options.zip) : load_plan(options.plan);
   Session session(options.common, command_line);
@@ -314,7 +315,16 @@ void run(const Options& options, const std::string& command_line) {
   session.progress().say(fmt::format(
       "{} of {} pictures to render{}", pending.size(), points.size(),
       own > pending.size() ? fmt::format(", {} are there", own - pending.size()) : std::string()));
-  if (!pending.empty()) render_points(options, scene, medium, pending, session);
+  if (!pending.empty()) {
+    const std::string manifest = options.output + "/manifest.json";
+    std::filesystem::remove(manifest);  // it speaks of pictures that will be others
+    if (options.engine.uses_slurm()) {
+      run_on_slurm({find_words(command), options.output, keys_of(points)}, options.engine, session);
+      if (std::filesystem::exists(manifest)) return session.finish();  // else the job that merges failed
+    } else {
+      render_points(options, scene, medium, pending, session);
+    }
+  }
 
   std::vector<SweepRecord> records;
   for (const Point& point : points)
@@ -355,7 +365,8 @@ void add_sweep_command(CLI::App& app, const std::string& command_line) {
   command->get_option("--cache")->required();
   command->add_flag("--no-shadows", options->bake.no_shadows, "As the cache was baked");
   add_common_options(*command, options->common);
-  command->callback([options, command_line] { run(*options, command_line); });
+  add_engine_options(*command, options->engine);
+  command->callback([options, command, command_line] { run(*options, *command, command_line); });
 }
 
 }  // namespace nacre::tools

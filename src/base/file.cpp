@@ -50,8 +50,11 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follo
     if (!S_ISREG(status.st_mode))
       fail(ErrorCode::kIo, path_, "cannot write: it is not a regular file; give the name of one");
   }
-  temporary_ = fmt::format("{}.tmp-{}-{}", target_, ::getpid(), serial++);
-  descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  // Another machine, or a process that was killed, may have left one of the same number.
+  do {
+    temporary_ = fmt::format("{}.tmp-{}-{}", target_, ::getpid(), serial++);
+    descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } while (descriptor_ < 0 && errno == EEXIST);
   if (descriptor_ < 0) fail_io(path_, "write");
 }
 

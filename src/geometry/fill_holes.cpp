@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "geometry/edge_table.h"
 
@@ -18,61 +19,97 @@ constexpr double kSliver = 1e-6;
 
 using Loop = std::vector<std::uint32_t>;
 
-// Edges that wait for a face, by the vertex where they begin.
+// Edges that wait for a face, as seen from both ends.
 class OpenEdges {
  public:
+  struct Step {
+    std::uint32_t to;
+    bool forward;  // the other way than the face that is there goes, as its neighbour should
+  };
   explicit OpenEdges(std::span<const Triangle> triangles) {
     for_each_edge(sorted_sides(triangles), [&](std::span<const Side> edge) {
       if (edge.size() != 1) return;
       const auto [low, high, corner, forward] = edge.front();
-      const std::uint32_t from = forward ? high : low;  // the other way than the face that is there
-      if (ends_[from].empty()) starts_.push_back(from);
-      ends_[from].push_back(forward ? low : high);
+      const std::uint32_t from = forward ? high : low, to = forward ? low : high;
+      if (steps_[from].empty()) starts_.push_back(from);
+      steps_[from].push_back({to, true});
+      steps_[to].push_back({from, false});
     });
   }
   const std::vector<std::uint32_t>& starts() const { return starts_; }
   bool leads_on(std::uint32_t vertex) const {
-    const auto found = ends_.find(vertex);
-    return found != ends_.end() && !found->second.empty();
+    const auto found = steps_.find(vertex);
+    return found != steps_.end() && !found->second.empty();
   }
-  std::uint32_t take(std::uint32_t vertex) {
-    std::vector<std::uint32_t>& ends = ends_[vertex];
-    const std::uint32_t end = ends.back();
-    ends.pop_back();
-    return end;
+  /// Backward only where there is no way forward: beside a face that is the wrong way round.
+  Step take(std::uint32_t vertex) {
+    std::vector<Step>& steps = steps_[vertex];
+    auto chosen = std::ranges::find_if(steps, &Step::forward);
+    if (chosen == steps.end()) --chosen;
+    const Step step = *chosen;
+    steps.erase(chosen);
+    std::vector<Step>& other = steps_[step.to];
+    other.erase(std::ranges::find_if(
+        other, [&](const Step& back) { return back.to == vertex && back.forward != step.forward; }));
+    return step;
   }
 
  private:
-  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> ends_;
+  std::unordered_map<std::uint32_t, std::vector<Step>> steps_;
   std::vector<std::uint32_t> starts_;
 };
 
-// Loops that visit no vertex twice; counts edges that are in none.
+// Loops that visit no vertex twice, the way round that most faces beside them want; counts edges that are in
+// none.
 std::vector<Loop> find_loops(std::span<const Triangle> triangles, std::size_t& left) {
   OpenEdges edges(triangles);
   std::vector<Loop> loops;
   Loop path;
+  std::vector<bool> forward;  // by edge of the path
   std::unordered_map<std::uint32_t, std::size_t> places;
   for (const std::uint32_t start : edges.starts())
     while (edges.leads_on(start)) {
       path.assign(1, start);
+      forward.clear();
       places = {{start, 0}};
       while (edges.leads_on(path.back())) {
-        const std::uint32_t next = edges.take(path.back());
-        const auto [found, is_new] = places.try_emplace(next, path.size());
+        const OpenEdges::Step step = edges.take(path.back());
+        forward.push_back(step.forward);
+        const auto [found, is_new] = places.try_emplace(step.to, path.size());
         if (is_new) {
-          path.push_back(next);
+          path.push_back(step.to);
           continue;
         }
-        const auto begin = path.begin() + static_cast<std::ptrdiff_t>(found->second);
-        loops.emplace_back(begin, path.end());
+        const auto first = static_cast<std::ptrdiff_t>(found->second);
+        const auto begin = path.begin() + first;
+        Loop& loop = loops.emplace_back(begin, path.end());
+        const auto right = std::count(forward.begin() + first, forward.end(), true);
+        if (2 * static_cast<std::size_t>(right) < loop.size()) std::ranges::reverse(loop);
         for (auto vertex = begin + 1; vertex != path.end(); ++vertex) places.erase(*vertex);
         path.erase(begin + 1, path.end());
+        forward.erase(forward.begin() + first, forward.end());
       }
       left += path.size() - 1;
     }
   return loops;
 }
+
+// Edges that there are already. A triangle across two sides of a face that sticks out into a hole would lie
+// on that face.
+class TakenEdges {
+ public:
+  void add(std::span<const Triangle> triangles) {
+    for (const Triangle& t : triangles)
+      for (std::size_t i = 0; i < 3; ++i) edges_.insert(key(t[i], t[(i + 1) % 3]));
+  }
+  bool contain(std::uint32_t a, std::uint32_t b) const { return edges_.contains(key(a, b)); }
+
+ private:
+  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+  }
+  std::unordered_set<std::uint64_t> edges_;
+};
 
 // Twice the area, and a little for a triangle that has none: along a straight border they come for free.
 double triangle_cost(const std::vector<Vec3>& positions, const Triangle& t, double little) {
@@ -81,13 +118,15 @@ double triangle_cost(const std::vector<Vec3>& positions, const Triangle& t, doub
   return area > kSliver * std::max({ab.length2(), ac.length2(), (ac - ab).length2()}) ? area : area + little;
 }
 
-// Triangles over a loop that have the least area together.
-void triangulate(const Loop& loop, const std::vector<Vec3>& positions, std::vector<Triangle>& triangles) {
+// Triangles over a loop that have the least area together, across as few edges that are taken as can be.
+void triangulate(const Loop& loop, const std::vector<Vec3>& positions, const TakenEdges& taken,
+                 std::vector<Triangle>& triangles) {
   const std::size_t n = loop.size();
   double length = 0;
   for (std::size_t i = 0; i < n; ++i)
     length += (Vec3d(positions[loop[(i + 1) % n]]) - Vec3d(positions[loop[i]])).length();
   const double little = kSliver * square(length);
+  const double much = square(length);     // more than any triangle over it has
   std::vector<double> least(n * n, 0.0);  // from corner i to corner k
   std::vector<std::uint32_t> middle(n * n, 0);
   for (std::size_t span = 2; span < n; ++span)
@@ -101,7 +140,9 @@ void triangulate(const Loop& loop, const std::vector<Vec3>& positions, std::vect
         best = area;
         middle[i * n + k] = static_cast<std::uint32_t>(j);
       }
-      least[i * n + k] = best;
+      // All but the side that closes the loop runs across it.
+      const bool across = span + 1 < n;
+      least[i * n + k] = best + (across && taken.contain(loop[i], loop[k]) ? much : 0);
     }
   std::vector<std::array<std::size_t, 2>> open{{0, n - 1}};
   while (!open.empty()) {
@@ -117,7 +158,7 @@ void triangulate(const Loop& loop, const std::vector<Vec3>& positions, std::vect
 
 // The same for a loop of any length: over every so many of its corners first, then between these and the
 // others. At a border that turns smoothly little is lost.
-void triangulate_coarsely(const Loop& loop, const std::vector<Vec3>& positions,
+void triangulate_coarsely(const Loop& loop, const std::vector<Vec3>& positions, const TakenEdges& taken,
                           std::vector<Triangle>& triangles) {
   const std::size_t step = (loop.size() + kMostEdges - 1) / kMostEdges;
   Loop coarse;
@@ -126,9 +167,9 @@ void triangulate_coarsely(const Loop& loop, const std::vector<Vec3>& positions,
     Loop chain;
     for (std::size_t i = begin; i <= std::min(begin + step, loop.size()); ++i)
       chain.push_back(loop[i % loop.size()]);
-    if (chain.size() > 2) triangulate(chain, positions, triangles);
+    if (chain.size() > 2) triangulate(chain, positions, taken, triangles);
   }
-  triangulate(coarse, positions, triangles);
+  triangulate(coarse, positions, taken, triangles);
 }
 
 // Adds the triangles of one hole, with vertices of their own where normals are given.
@@ -162,10 +203,14 @@ void add_patch(Mesh& mesh, std::vector<Triangle> patch) {
 
 std::size_t fill_holes(Mesh& mesh, const std::string& place, Warnings& warnings) {
   std::size_t left = 0;
-  const std::vector<Loop> loops = find_loops(welded_triangles(mesh), left);
+  const std::vector<Triangle> triangles = welded_triangles(mesh);
+  const std::vector<Loop> loops = find_loops(triangles, left);
+  TakenEdges taken;
+  if (!loops.empty()) taken.add(triangles);
   for (const Loop& loop : loops) {
     std::vector<Triangle> patch;
-    triangulate_coarsely(loop, mesh.positions, patch);
+    triangulate_coarsely(loop, mesh.positions, taken, patch);
+    taken.add(patch);
     add_patch(mesh, std::move(patch));
   }
   if (left > 0)

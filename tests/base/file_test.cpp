@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 namespace nacre {
 namespace {
@@ -44,6 +45,19 @@ TEST_F(AtomicFileTest, AppearsWhenCommitted) {
   save(path("a"), "second");
   EXPECT_EQ(read_text_file(path("a")), "second");
   EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(AtomicFileTest, PassesOverWhatIsLeftOfOthers) {
+  const auto serial_of = [](const AtomicFile& file) {
+    const std::string& name = file.temporary_path();
+    return std::stoul(name.substr(name.rfind('-') + 1));
+  };
+  const AtomicFile first(path("a"));
+  const std::string stem = first.temporary_path().substr(0, first.temporary_path().rfind('-') + 1);
+  const unsigned long next = serial_of(first) + 1;
+  std::ofstream(stem + std::to_string(next)) << "left";
+  EXPECT_EQ(serial_of(AtomicFile(path("a"))), next + 1);
+  EXPECT_EQ(read_text_file(stem + std::to_string(next)), "left");
 }
 
 TEST_F(AtomicFileTest, SymbolicLinksStay) {

@@ -98,6 +98,38 @@ TEST(FillHoles, ScansAreClosedWithNormalsOfTheirOwn) {
   EXPECT_TRUE(warnings.empty());
 }
 
+// Every fifth triangle is the wrong way round, those beside holes, too.
+TEST(FillHoles, FlippedFacesBesideThem) {
+  Mesh mesh = with_holes(make_sphere(), [](const Vec3& p) {
+    return (p - Vec3(0, 0.6f, 0.8f)).length() < 0.3f || (p - Vec3(0.8f, 0, -0.6f)).length() < 0.2f;
+  });
+  const std::size_t before = mesh.triangles.size();
+  for (std::size_t i = 0; i < before; i += 5) std::swap(mesh.triangles[i][0], mesh.triangles[i][1]);
+  const std::uint64_t duplicates = analyse_topology(mesh).duplicate_faces;
+  Warnings warnings;
+  EXPECT_EQ(fill_holes(mesh, "test", warnings), 2u);
+  EXPECT_TRUE(warnings.empty());
+  const TopologyReport report = analyse_topology(mesh);
+  EXPECT_TRUE(report.closed());
+  EXPECT_EQ(report.duplicate_faces, duplicates);
+  // What is new looks outwards, as most faces beside it do.
+  for (std::size_t i = before; i < mesh.triangles.size(); ++i)
+    EXPECT_GT(face_normal(mesh, i).dot(mesh.positions[mesh.triangles[i][0]]), 0);
+}
+
+// A face that hangs in a hole by one edge is not covered by another one.
+TEST(FillHoles, FacesThatStickOut) {
+  // A square hole in the top of a box, across one side of which a triangle reaches.
+  Mesh mesh = make_box(3, [](float x, float y) { return x > 1 && x < 2 && y > 1 && y < 2; });
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const Vec3& p : {Vec3(1, 1, 1), Vec3(2, 1, 1), Vec3(1.5f, 1.02f, 1)}) mesh.positions.push_back(p);
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  Warnings warnings;
+  EXPECT_EQ(fill_holes(mesh, "test", warnings), 1u);
+  EXPECT_EQ(describe_problems(analyse_topology(mesh)), "");
+  EXPECT_NEAR(surface_area(mesh), 2 * 9 + 4 * 3, 1e-4);
+}
+
 // An open cylinder of 3000 sides: more than are worth the best triangulation.
 TEST(FillHoles, LargeLoops) {
   constexpr std::uint32_t kSides = 3000;

@@ -131,6 +131,8 @@ TEST_F(Sweep, GoesOnWhereItWas) {
   renders(sweep, 3);
   EXPECT_EQ(bytes("d/0003.exr"), whole);
   renders(sweep, 0);
+  renders(sweep + " --simd scalar", 4);
+  renders(sweep + " --simd scalar", 0);
   renders(sweep + " --spp 3", 4);
   EXPECT_NE(bytes("d/0003.exr"), whole);
 }
