@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -162,6 +163,13 @@ TEST_F(Sweep, ShardsMakeTheSameFiles) {
   run(sweep + "e --shard 1/2 --threads 1");
   for (const char* name : {"0001.exr", "0002.exr", "0005.exr", "0004.png", "contact_sheet.png", "index.html"})
     EXPECT_EQ(bytes(std::string("d/") + name), bytes(std::string("e/") + name)) << name;
+}
+
+TEST_F(Sweep, SaysThatThereIsNoSlurm) {
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", "/nowhere", 1);
+  expect_refusal("--vary sigma_a=1:2:3 --engine slurm", 1, "no sbatch in the PATH");
+  ::setenv("PATH", path.c_str(), 1);
 }
 
 TEST_F(Sweep, RefusesWhatItCannotVary) {
