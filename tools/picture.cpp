@@ -19,6 +19,7 @@ KeyValues make_conditions(const RenderOptions& options, const RenderParams& para
   const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
   add("nacre", kVersion);
   if (!is_mesh_file_name(options.scene.path)) add("scene", bytes_digest(read_text_file(options.scene.path)));
+  add("contents", contents_digest(scene));
   for (const std::string& define : options.scene.defines) add("define", define);
   add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));
   add("picture", fmt::format("{} {} {} {} {} {} {}", params.width, params.height, params.crop_x,

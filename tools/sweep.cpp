@@ -320,7 +320,10 @@ void run(const Options& options, const CLI::App& command, const std::string& com
     std::filesystem::remove(manifest);  // it speaks of pictures that will be others
     if (options.engine.uses_slurm()) {
       run_on_slurm({find_words(command), options.output, keys_of(points)}, options.engine, session);
-      if (std::filesystem::exists(manifest)) return session.finish();  // else the job that merges failed
+      if (std::filesystem::exists(manifest)) {  // else the job that merges failed
+        session.progress().say(manifest + ", contact_sheet.png and index.html");
+        return session.finish();
+      }
     } else {
       render_points(options, scene, medium, pending, session);
     }

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "nacre/base/simd.h"
 #include "shell.h"
@@ -100,12 +101,13 @@ std::vector<std::string> submit(const SlurmSweep& sweep, const std::vector<std::
   return jobs;
 }
 
-[[noreturn]] void die_of_signal(const std::vector<std::string>& jobs, const std::string& folder) {
-  const bool cancelled = cancel_jobs(jobs);
-  fmt::print(
-      stderr,
-      "\nnacre: interrupted; Slurm jobs {} {}; what is complete stays in {}, and the same command goes on\n",
-      fmt::join(jobs, " and "), cancelled ? "are cancelled" : "could not be cancelled (scancel)", folder);
+[[noreturn]] void die_of_signal(const std::vector<std::string>& jobs, const std::string& folder,
+                                Session& session) {
+  const char* const fate = cancel_jobs(jobs) ? "are cancelled" : "may go on: scancel them";
+  session.progress().warn(
+      fmt::format("interrupted; Slurm jobs {} {}; what is complete stays in {}, and the same command goes on "
+                  "with the rest",
+                  fmt::join(jobs, " and "), fate, folder));
   std::signal(interrupted, SIG_DFL);
   std::raise(interrupted);
   std::abort();
@@ -128,16 +130,14 @@ void wait_for(const std::vector<std::string>& jobs, const SlurmSweep& sweep,
     const auto now = static_cast<std::size_t>(std::ranges::count_if(missing, [&](std::size_t point) {
       return records.contains(std::filesystem::path(record_path(sweep.folder, point)).filename().string());
     }));
-    progress.advance(now - std::min(now, arrived));
-    arrived = std::max(now, arrived);
+    if (now > arrived) progress.advance(now - std::exchange(arrived, now));
   };
   SlurmTasks tasks, said;
   bool answers = true;
   double pause = kShortestWait;
   for (Stopwatch watch, whole;;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (interrupted != 0) die_of_signal(jobs, sweep.folder);
-    progress.advance(0);
+    if (interrupted != 0) die_of_signal(jobs, sweep.folder, session);
     if (watch.seconds() < pause) continue;
     look();
     const bool answered = query_jobs(jobs, tasks);

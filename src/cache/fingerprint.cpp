@@ -243,6 +243,14 @@ BakeConditions fingerprint_conditions(const KeyValues& fingerprint, std::size_t 
   return conditions;
 }
 
+std::string contents_digest(const Scene& scene) {
+  KeyValues contents;
+  for (const Shape& shape : scene.shapes)
+    contents.emplace_back("mesh", hash_geometry(shape.mesh, true, true));
+  for (const Texture& texture : scene.textures) contents.emplace_back("texture", text(texture));
+  return fingerprint_digest(contents);
+}
+
 std::string samples_digest(const CacheGroup& group) {
   const HashState state = make_hash();
   for (const auto& plane : group.planes) XXH3_128bits_update(state.get(), plane.data(), plane.size_bytes());

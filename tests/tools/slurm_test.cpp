@@ -114,7 +114,7 @@ TEST_F(Slurm, CancelsItsJobs) {
   EXPECT_TRUE(wait_until([] { return cluster_->job_processes("n1").size() == 1; }, 20));
   ::kill(std::atoi(bytes("pid").c_str()), SIGINT);
   const std::string output = sweep.get();
-  EXPECT_NE(output.find("nacre: interrupted; Slurm jobs"), std::string::npos) << output;
+  EXPECT_NE(output.find("nacre: warning: interrupted; Slurm jobs"), std::string::npos) << output;
   EXPECT_NE(output.find("are cancelled"), std::string::npos) << output;
   EXPECT_TRUE(wait_until([] { return read_command("squeue -h").empty(); }, 20)) << read_command("squeue");
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -137,6 +138,23 @@ TEST_F(Sweep, GoesOnWhereItWas) {
   EXPECT_NE(bytes("d/0003.exr"), whole);
 }
 
+TEST_F(Sweep, NoticesATextureThatChanged) {
+  std::string scene = kScene;
+  const std::string plain = "<rgb name=\"reflectance\" value=\"0.4, 0.3, 0.2\"/>";
+  scene.replace(scene.find(plain), plain.size(),
+                "<texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" "
+                "value=\"floor.png\"/></texture>");
+  folder_.write("t.xml", scene);
+  // Of the cache, which no light reaches by the floor, it is no part.
+  run("render s.xml --cache c.nacre -o floor.exr --png --quiet --size 8x8");
+  run("bake t.xml -o t.nacre --quiet --points 4000 --bounces 0");
+  const std::string sweep = "sweep t.xml --cache t.nacre -o d --vary sigma_a=0.01:0.04:2";
+  EXPECT_NE(run(sweep).find("2 of 2 pictures to render"), std::string::npos);
+  run("render s.xml --cache c.nacre -o floor.exr --png --quiet --size 8x8 --camera side");
+  EXPECT_NE(run(sweep).find("2 of 2 pictures to render"), std::string::npos);
+  EXPECT_NE(run(sweep).find("0 of 2 pictures to render"), std::string::npos);
+}
+
 TEST_F(Sweep, ShardsMakeTheSameFiles) {
   const std::string sweep = "sweep s.xml --cache c.nacre --quiet --vary sigma_a=0.01:0.05:5 -o ";
   run(sweep + "d");
@@ -145,6 +163,13 @@ TEST_F(Sweep, ShardsMakeTheSameFiles) {
   run(sweep + "e --shard 1/2 --threads 1");
   for (const char* name : {"0001.exr", "0002.exr", "0005.exr", "0004.png", "contact_sheet.png", "index.html"})
     EXPECT_EQ(bytes(std::string("d/") + name), bytes(std::string("e/") + name)) << name;
+}
+
+TEST_F(Sweep, SaysThatThereIsNoSlurm) {
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", "/nowhere", 1);
+  expect_refusal("--vary sigma_a=1:2:3 --engine slurm", 1, "no sbatch in the PATH");
+  ::setenv("PATH", path.c_str(), 1);
 }
 
 TEST_F(Sweep, RefusesWhatItCannotVary) {

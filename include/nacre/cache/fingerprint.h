@@ -25,6 +25,10 @@ KeyValues make_fingerprint(const Scene& scene, const BakeConditions& conditions)
 /// The conditions that a fingerprint was made with, for `groups` media; missing bounces are 0.
 BakeConditions fingerprint_conditions(const KeyValues& fingerprint, std::size_t groups);
 
+/// A 32-digit hash of what a scene file refers to, whether or not a cache depends on it: meshes with normals
+/// and texture coordinates, textures.
+std::string contents_digest(const Scene& scene);
+
 /// A 32-digit hash of a group's samples and octree, whatever scene they belong to.
 std::string samples_digest(const CacheGroup& group);
 
