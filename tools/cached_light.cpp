@@ -114,10 +114,10 @@ Cache load_matching_cache(const std::string& path, const Scene& scene, bool shad
     etas.push_back(conditions.every_eta ? double{scene.media[m].eta()} : group.eta);
     if (!serves_eta(group, etas[m]))
       fail(ErrorCode::kMismatch, path,
-           "the cache holds irradiance for indices of refraction from {} to {}, and that of {} is {:.6g}; "
-           "bake "
-           "it again",
-           kLeastEta, kMostEta, medium_label(scene, m), etas[m]);
+           "the cache holds irradiance for {}, and the index of refraction of {} is {:.6g}; bake it again",
+           group.lights.empty() ? fmt::format("an index of refraction of {:.6g} alone", group.eta)
+                                : fmt::format("indices of refraction from {} to {}", kLeastEta, kMostEta),
+           medium_label(scene, m), etas[m]);
     scales = scale_planes(group, scene, light_scales, path);
   }
   relight(cache, etas, scales);

@@ -23,7 +23,8 @@ Image shrink(const Image& image, int edge);
 Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture>& pictures);
 
 /// A page of HTML that needs nothing beside it: thumbnails with their settings, and a slider for each axis
-/// that shows one picture; links lead to the previews.
+/// (for the number of the picture, if there is none) that shows one picture; links lead to the previews.
+/// "#key=value&key=value" after its address chooses one.
 std::string make_sweep_page(const SweepPlan& plan, const std::vector<SheetPicture>& pictures,
                             const std::string& title);
 

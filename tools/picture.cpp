@@ -1,5 +1,7 @@
-// Named values for all that changes a pixel.
+// The key of a picture, and finding it again.
 #include "picture.h"
+
+#include <filesystem>
 
 #include "nacre/base/file.h"
 #include "nacre/base/simd.h"
@@ -33,6 +35,18 @@ KeyValues make_conditions(const RenderOptions& options, const RenderParams& para
   add("shadows", bake.no_shadows ? "no" : "yes");
   add("simd", simd_target());
   return conditions;
+}
+
+bool is_complete(const Picture& picture) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(picture.path, error)) return false;
+  try {
+    const Image image = load_exr(picture.path);
+    const auto key = image.metadata.find(kKeyAttribute);
+    return key != image.metadata.end() && key->second == picture.key;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace nacre::tools

@@ -25,7 +25,7 @@ packages=(
   libbenchmark-dev
 )
 if [[ "${1:-}" == --tests ]]; then
-  packages+=(slurmctld slurmd slurm-client munge)
+  packages+=(chromium slurmctld slurmd slurm-client munge)
 fi
 
 # Those of the named packages that are not installed, one a line.

@@ -36,6 +36,7 @@ constexpr std::string_view kHead = R"html(<!doctype html>
 body { background: #181818; color: #ddd; font: 14px sans-serif; margin: 16px; }
 a { color: inherit; }
 #axes label { display: inline-block; margin: 0 24px 8px 0; }
+#one { margin: 0; }
 #one img { min-width: 320px; image-rendering: auto; }
 #all { display: grid; gap: 8px; margin-top: 16px; }
 #all figure { margin: 0; }
@@ -65,7 +66,7 @@ const sliders = sweep.axes.map(axis => {
   range.value = 0;
   label.append(axis.name + ' ', range, ' ', text);
   axes.append(label);
-  range.addEventListener('input', () => show(chosen()));
+  range.addEventListener('input', () => choose(sweep.together ? Number(range.value) : chosen()));
   return {axis, range, text};
 });
 function chosen() {
@@ -81,12 +82,26 @@ function place(index) {
 }
 function show(index) {
   const picture = sweep.pictures[index];
-  if (sliders.length) place(index);
+  place(index);
   for (const s of sliders) s.text.textContent = s.axis.values[s.range.value];
   one.querySelector('a').href = picture.file;
   one.querySelector('img').src = picture.thumbnail;
   one.querySelector('figcaption').textContent = picture.label;
   [...all.children].forEach((figure, i) => figure.classList.toggle('chosen', i === index));
+}
+// The address leads back to what is shown: page.html#key=value&key=value
+function choose(index) {
+  show(index);
+  history.replaceState(null, '', '#' + sliders.map(s => encodeURIComponent(s.axis.name) + '=' +
+    encodeURIComponent(s.axis.values[s.range.value])).join('&'));
+}
+function follow() {
+  const wanted = new URLSearchParams(location.hash.slice(1));
+  for (const s of sliders) {
+    const value = s.axis.values.indexOf(wanted.get(s.axis.name));
+    if (value >= 0) (sweep.together ? sliders[0] : s).range.value = value;
+  }
+  show(chosen());
 }
 all.style.gridTemplateColumns = 'repeat(' + sweep.columns + ', minmax(96px, 1fr))';
 sweep.pictures.forEach((picture, index) => {
@@ -95,10 +110,11 @@ sweep.pictures.forEach((picture, index) => {
   image.src = picture.thumbnail;
   image.alt = caption.textContent = picture.label;
   figure.append(image, caption);
-  figure.addEventListener('click', () => show(index));
+  figure.addEventListener('click', () => choose(index));
   all.append(figure);
 });
-show(0);
+addEventListener('hashchange', follow);
+follow();
 </script>
 </body>
 </html>
@@ -117,6 +133,12 @@ std::string make_sweep_page(const SweepPlan& plan, const std::vector<SheetPictur
     for (const Setting& value : axis.values) values.push_back(value.value);
     sweep["axes"].push_back({{"name", axis.name}, {"values", values}});
     grid *= axis.values.size();
+  }
+  if (plan.axes.empty()) {
+    nlohmann::ordered_json numbers;
+    for (std::size_t i = 0; i < pictures.size(); ++i) numbers.push_back(std::to_string(i + 1));
+    sweep["axes"].push_back({{"name", "picture"}, {"values", numbers}});
+    grid = pictures.size();
   }
   sweep["together"] = grid != pictures.size();
   sweep["columns"] = plan.axes.size() > 1 && grid == pictures.size()

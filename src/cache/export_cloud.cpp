@@ -38,7 +38,9 @@ std::string make_header(const Cache& cache) {
   for (const auto& [key, value] : cache.fingerprint) comment(kCloudFingerprint, key, value);
   for (const auto& [key, value] : cache.info) comment(kCloudInfo, key, value);
   for (const CacheGroup& group : cache.groups)
-    comment(kCloudGroup, group.name, fmt::format("{}", group.surface_area));
+    comment(kCloudGroup, group.name,
+            group.eta > 0 ? fmt::format("{} {}", group.surface_area, group.eta)
+                          : fmt::format("{}", group.surface_area));
   text += fmt::format("element vertex {}\n", cache.sample_count());
   for (const char* column : kCloudColumns) text += fmt::format("property float {}\n", column);
   return text + fmt::format("property int {}\nend_header\n", kGroupColumn);

@@ -57,9 +57,14 @@ Cache parse_comments(const std::vector<std::string>& comments, const std::string
     if (what != kCloudGroup) continue;
     CacheGroup& group = cache.groups.emplace_back();
     group.name = key;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), group.surface_area);
-    if (error != std::errc() || end != value.data() + value.size() || !(group.surface_area >= 0) ||
-        !std::isfinite(group.surface_area))
+    // The area and, of caches that know it, the index of refraction that the irradiance is for.
+    const std::size_t space = std::min(value.find(' '), value.size());
+    const auto read = [&](std::size_t begin, std::size_t finish, double& number) {
+      const auto [end, error] = std::from_chars(value.data() + begin, value.data() + finish, number);
+      return error == std::errc() && end == value.data() + finish && number >= 0 && std::isfinite(number);
+    };
+    if (!read(0, space, group.surface_area) ||
+        (space < value.size() && !read(space + 1, value.size(), group.eta)))
       fail(ErrorCode::kSyntax, path, "the area of the group {} is {}, no number of 0 or more",
            quote_word(key), quote_word(value));
   }
@@ -199,6 +204,7 @@ Cache import_cloud(const std::string& path, const Cache* like) {
       CacheGroup& own = cache.groups.emplace_back();
       own.name = group.name;
       own.surface_area = group.surface_area;
+      own.eta = group.eta;
     }
   } else if (cache.fingerprint.empty() || cache.groups.empty()) {
     fail(ErrorCode::kUnsupported, path,
@@ -233,8 +239,11 @@ Cache import_cloud(const std::string& path, const Cache* like) {
   reader.expect_end();
   for (std::size_t g = 0; g < samples.size(); ++g) check_group(samples[g], cache.groups[g], path);
   std::vector<std::shared_ptr<const void>> storage;
-  for (std::size_t g = 0; g < samples.size(); ++g)
+  for (std::size_t g = 0; g < samples.size(); ++g) {
+    const double eta = cache.groups[g].eta;
     cache.groups[g] = build_group(cache.groups[g].name, cache.groups[g].surface_area, samples[g], storage);
+    cache.groups[g].eta = eta;
+  }
   cache.storage = std::make_shared<const std::vector<std::shared_ptr<const void>>>(std::move(storage));
   return cache;
 }

@@ -1,6 +1,7 @@
 // Morton order, breadth-first subdivision, moments.
 #include "nacre/cache/octree.h"
 
+#include <atomic>
 #include <numeric>
 
 #include "cache/light_planes.h"
@@ -11,44 +12,75 @@
 namespace nacre {
 namespace {
 
-struct Keyed {
-  std::uint64_t code;
-  std::uint32_t index;
+// Which sample comes i-th; empty where they are in order already, as those of a bake are.
+using Order = std::vector<std::uint32_t>;
+
+template <class Body>
+void for_each_index(std::size_t count, const Body& body) {
+  parallel_for(count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
+// Codes are computed whenever they are asked for: kept, they would be a sixteenth of all the memory that a
+// bake takes.
+class MortonCode {
+ public:
+  explicit MortonCode(std::span<const Vec3> positions) {
+    for (const Vec3& p : positions) box_.extendBy(p);
+    const Vec3 size = box_.size();
+    const double extent = std::max({size.x, size.y, size.z});
+    to_cells_ = extent > 0 ? 0x1p21 / extent : 0;
+  }
+  std::uint64_t operator()(const Vec3& p) const {
+    return cell(p.x, box_.min.x) | cell(p.y, box_.min.y) << 1 | cell(p.z, box_.min.z) << 2;
+  }
+
+ private:
+  std::uint64_t cell(float value, float low) const {
+    return spread_bits(static_cast<std::uint64_t>(
+        std::clamp((static_cast<double>(value) - low) * to_cells_, 0.0, 0x1p21 - 1)));
+  }
+  Box3 box_;
+  double to_cells_;
 };
 
-std::vector<Keyed> sort_by_morton_code(std::span<const Vec3> positions) {
-  Box3 box;
-  for (const Vec3& p : positions) box.extendBy(p);
-  const Vec3 size = box.size();
-  const double extent = std::max({size.x, size.y, size.z});
-  const double to_cells = extent > 0 ? 0x1p21 / extent : 0;
-  const auto quantize = [&](float value, float low) {
-    return spread_bits(static_cast<std::uint64_t>(
-        std::clamp((static_cast<double>(value) - low) * to_cells, 0.0, 0x1p21 - 1)));
-  };
-  std::vector<Keyed> keyed(positions.size());
+Order sort_by_code(std::span<const Vec3> positions, const MortonCode& code_of) {
+  std::atomic<bool> in_order{true};
   parallel_for(positions.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    std::uint64_t last = code_of(positions[begin ? begin - 1 : 0]);
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3& p = positions[i];
-      keyed[i] = {quantize(p.x, box.min.x) | quantize(p.y, box.min.y) << 1 | quantize(p.z, box.min.z) << 2,
-                  static_cast<std::uint32_t>(i)};
+      const std::uint64_t code = code_of(positions[i]);
+      if (code < last) in_order.store(false, std::memory_order_relaxed);
+      last = code;
     }
   });
-  const auto before = [](const Keyed& a, const Keyed& b) {
-    return a.code != b.code ? a.code < b.code : a.index < b.index;
+  if (in_order) return {};
+  struct Keyed {
+    std::uint64_t code;
+    std::uint32_t index;
   };
-  if (!std::is_sorted(keyed.begin(), keyed.end(), before)) parallel_sort(keyed.begin(), keyed.end(), before);
-  return keyed;
+  std::vector<Keyed> keyed(positions.size());
+  for_each_index(keyed.size(), [&](std::size_t i) {
+    keyed[i] = {code_of(positions[i]), static_cast<std::uint32_t>(i)};
+  });
+  parallel_sort(keyed.begin(), keyed.end(), [](const Keyed& a, const Keyed& b) {
+    return a.code != b.code ? a.code < b.code : a.index < b.index;
+  });
+  Order order(keyed.size());
+  for_each_index(keyed.size(), [&](std::size_t i) { order[i] = keyed[i].index; });
+  return order;
 }
 
 // The tree's shape: breadth first, so that a level's nodes follow the level before it.
-std::vector<OctreeNode> divide(const std::vector<Keyed>& keyed) {
+std::vector<OctreeNode> divide(const CacheGroup& group, const MortonCode& code_of) {
+  const auto count = static_cast<std::uint32_t>(group.size());
   std::vector<OctreeNode> nodes;
-  if (keyed.empty()) return nodes;
+  if (count == 0) return nodes;
   // About two fifths as many as samples are usual on a surface; growing would copy all of them.
-  nodes.reserve(keyed.size() / 2 + 16);
+  nodes.reserve(count / 2 + 16);
   nodes.push_back({});
-  nodes[0].packed_counts = static_cast<std::uint32_t>(keyed.size());
+  nodes[0].packed_counts = count;
   std::size_t level_begin = 0;
   for (int depth = 0; depth < kMaxOctreeDepth && level_begin < nodes.size(); ++depth) {
     const std::size_t level_end = nodes.size();
@@ -59,10 +91,16 @@ std::vector<OctreeNode> divide(const std::vector<Keyed>& keyed) {
       if (last - first <= kMaxLeafSamples) continue;
       const auto first_child = static_cast<std::uint32_t>(nodes.size());
       for (std::uint32_t begin = first; begin < last;) {
-        const std::uint64_t octant = keyed[begin].code >> shift;
-        const auto split = std::partition_point(keyed.begin() + begin, keyed.begin() + last,
-                                                [&](const Keyed& k) { return k.code >> shift == octant; });
-        const auto end = static_cast<std::uint32_t>(split - keyed.begin());
+        const auto octant_of = [&](std::uint32_t i) { return code_of(group.position(i)) >> shift; };
+        const std::uint64_t octant = octant_of(begin);
+        std::uint32_t end = begin + 1;
+        for (std::uint32_t above = last; end < above;) {
+          const std::uint32_t middle = end + (above - end) / 2;
+          if (octant_of(middle) == octant)
+            end = middle + 1;
+          else
+            above = middle;
+        }
         OctreeNode child{};
         child.first_sample = begin;
         child.packed_counts = end - begin;
@@ -121,23 +159,11 @@ void compute_moments(const CacheGroup& group, OctreeNode& node) {
   }
 }
 
-// Which sample comes i-th.
-using Order = std::vector<std::uint32_t>;
-
-Order order_of(const std::vector<Keyed>& keyed) {
-  Order order(keyed.size());
-  parallel_for(order.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) order[i] = keyed[i].index;
-  });
-  return order;
-}
-
 // `values` in order, and then they are gone.
 template <class T, class U, class Store>
 void sort_into(const Order& order, std::vector<T>& values, std::span<U> sorted, const Store& store) {
-  parallel_for(values.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) store(sorted, i, values[order[i]]);
-  });
+  for_each_index(values.size(),
+                 [&](std::size_t i) { store(sorted, i, values[order.empty() ? i : order[i]]); });
   std::vector<T>().swap(values);
 }
 
@@ -162,24 +188,24 @@ void sort_triples(const Order& order, std::vector<Triple>& values, std::span<flo
 // What of all lights is kept in one vector, which that of a single light becomes if it is in order already:
 // ratios are a third of all that a sample takes.
 template <class T>
-void sort_of_lights(const Order& order, bool in_order, std::vector<SampleLight>& lights,
+void sort_of_lights(const Order& order, std::size_t n, std::vector<SampleLight>& lights,
                     std::vector<T> SampleLight::*member, std::vector<T>& sorted) {
-  if (in_order && lights.size() == 1) {
+  if (order.empty() && lights.size() == 1) {
     sorted = std::move(lights[0].*member);
     return;
   }
-  sorted.resize(order.size() * lights.size());
+  sorted.resize(n * lights.size());
   for (std::size_t l = 0; l < lights.size(); ++l)
-    sort_into(order, lights[l].*member, std::span(sorted).subspan(l * order.size(), order.size()),
+    sort_into(order, lights[l].*member, std::span(sorted).subspan(l * n, n),
               [](std::span<T> to, std::size_t i, const T& value) { to[i] = value; });
 }
 
 void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGroup& owned, CacheGroup& group) {
-  const std::size_t n = order.size(), count = lights.size();
+  const std::size_t n = group.size(), count = lights.size();
   const auto all = [&](auto member) {
     return std::ranges::all_of(lights, [&](const SampleLight& light) { return (light.*member).size() == n; });
   };
-  const bool apart = count > 1, in_order = std::ranges::is_sorted(order);
+  const bool apart = count > 1;
   if (apart) owned.light_irradiance.resize(3 * n * count);
   for (std::size_t l = 0; l < count; ++l) {
     group.lights.emplace_back().name = lights[l].name;
@@ -188,8 +214,8 @@ void sort_lights(const Order& order, std::vector<SampleLight>& lights, OwnedGrou
     };
     if (apart) sort_triples(order, lights[l].irradiance, channel(0), channel(1), channel(2));
   }
-  if (all(&SampleLight::errors)) sort_of_lights(order, in_order, lights, &SampleLight::errors, owned.errors);
-  if (all(&SampleLight::ratios)) sort_of_lights(order, in_order, lights, &SampleLight::ratios, owned.ratios);
+  if (all(&SampleLight::errors)) sort_of_lights(order, n, lights, &SampleLight::errors, owned.errors);
+  if (all(&SampleLight::ratios)) sort_of_lights(order, n, lights, &SampleLight::ratios, owned.ratios);
   point_lights_into(group, owned.light_irradiance, owned.errors, owned.ratios);
 }
 
@@ -200,7 +226,12 @@ double hexagonal_spacing(double area, double count) {
 }
 
 std::vector<std::uint32_t> octree_order(std::span<const Vec3> positions) {
-  return order_of(sort_by_morton_code(positions));
+  Order order = sort_by_code(positions, MortonCode(positions));
+  if (order.empty()) {
+    order.resize(positions.size());
+    std::iota(order.begin(), order.end(), 0u);
+  }
+  return order;
 }
 
 void sum_nodes(const CacheGroup& group, std::span<OctreeNode> nodes) {
@@ -215,18 +246,16 @@ CacheGroup build_group(std::string name, double surface_area, SurfaceSamples sam
     fail(ErrorCode::kLimit, name, "{} samples in one group; the most is {}", samples.size(),
          kMaxSamplesPerGroup);
   const auto owned = std::make_shared<OwnedGroup>();
-  // Codes are gone before the planes come, and samples as these do: that is what takes most memory at once.
-  const Order order = [&] {
-    const std::vector<Keyed> keyed = sort_by_morton_code(samples.positions);
-    owned->nodes = divide(keyed);
-    return order_of(keyed);
-  }();
+  const MortonCode code_of(samples.positions);
+  const Order order = sort_by_code(samples.positions, code_of);
+  // Samples are gone as planes come, before there are nodes: that is what takes most memory at once.
+  const std::size_t count = samples.size();
   CacheGroup group;
   group.name = std::move(name);
   group.surface_area = surface_area;
   const auto add_planes = [&](std::size_t first, auto& triples) {
     for (std::size_t k = first; k < first + 3; ++k) {
-      owned->planes[k].resize(order.size());
+      owned->planes[k].resize(count);
       group.planes[k] = owned->planes[k];
     }
     sort_triples(order, triples, std::span(owned->planes[first]), std::span(owned->planes[first + 1]),
@@ -235,12 +264,13 @@ CacheGroup build_group(std::string name, double surface_area, SurfaceSamples sam
   add_planes(0, samples.positions);
   add_planes(3, samples.normals);
   auto& areas = owned->planes[static_cast<std::size_t>(Plane::kArea)];
-  areas.resize(order.size());
+  areas.resize(count);
   group.planes[static_cast<std::size_t>(Plane::kArea)] = areas;
   sort_into(order, samples.areas, std::span(areas),
             [](std::span<float> sorted, std::size_t i, float area) { sorted[i] = area; });
   add_planes(7, samples.irradiance);
   sort_lights(order, samples.lights, *owned, group);
+  owned->nodes = divide(group, code_of);
   sum_nodes(group, owned->nodes);
   group.nodes = owned->nodes;
   storage.push_back(owned);

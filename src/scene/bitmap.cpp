@@ -8,6 +8,7 @@
 
 #include "nacre/base/file.h"
 #include "scene/bitmap_exr.h"
+#include "scene/picture_guard.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -72,6 +73,7 @@ std::vector<Rgb> take_texels(Value* values, std::size_t count, const std::string
 Bitmap decode_with_stb(const std::string& bytes, Format format, float gamma, const std::string& path) {
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
+  if (format == Format::kPng) check_png_chunks(bytes, path);
   Bitmap bitmap;
   int channels = 0;
   if (!stbi_info_from_memory(data, size, &bitmap.width, &bitmap.height, &channels) || bitmap.width <= 0 ||
@@ -89,6 +91,7 @@ Bitmap decode_with_stb(const std::string& bytes, Format format, float gamma, con
   int width = 0, height = 0;
   const auto count = static_cast<std::size_t>(pixels);
   if (format == Format::kHdr) {
+    check_hdr_pixels(bytes, bitmap.width, bitmap.height, path);
     bitmap.texels =
         take_texels(stbi_loadf_from_memory(data, size, &width, &height, &channels, 3), count, path,
                     [&](float x) { return decode(x, gamma == kGammaOfFormat ? 1 : gamma); });

@@ -71,6 +71,25 @@ TEST_F(Relit, OneCacheServesEveryIndex) {
   run("render s.xml --cache g.nacre -o x.exr --quiet -D eta=2.4");
 }
 
+TEST_F(Relit, APointCloudServesTheIndexThatItWasBakedWith) {
+  for (const char* options : {"", " --per-light", " --fixed-eta"}) {
+    run(std::string("bake s.xml -o c.nacre --quiet") + options);
+    run("export c.nacre c.ply --quiet");
+    run("import c.ply -o d.nacre --quiet");
+    run("import c.ply -o l.nacre --like c.nacre --quiet");
+    run("render s.xml --cache c.nacre -o c.exr --quiet");
+    for (const char* cache : {"d.nacre", "l.nacre"}) {
+      run(std::string("render s.xml -o d.exr --quiet --cache ") + cache);
+      run("diff d.exr c.exr --fail-above 0");
+    }
+  }
+  run("bake s.xml -o c.nacre --quiet");
+  run("export c.nacre c.ply --quiet");
+  run("import c.ply -o d.nacre --quiet");
+  expect_refusal("render s.xml --cache d.nacre -o x.exr --quiet -D eta=1.3", 1,
+                 "an index of refraction of 1.5 alone");
+}
+
 // The whole picture follows, as if the scene had said so.
 TEST_F(Relit, LightsAreScaledWithoutABake) {
   run("bake s.xml -o c.nacre --quiet --per-light");
