@@ -21,7 +21,7 @@ std::vector<std::string> sorted_names(const Image& image) {
   return names;
 }
 
-// The same for all parts of a picture.
+// Without what is of a part alone.
 std::map<std::string, std::string> common_metadata(const Image& image) {
   std::map<std::string, std::string> metadata = image.metadata;
   for (const char* const own : {"nacre:command", "nacre:key"}) metadata.erase(own);
@@ -104,7 +104,7 @@ Image merge_images(const std::vector<std::string>& paths) {
     parts.push_back(place);
   }
   if (!parts.empty()) check_covered(covered, frame, parts);
-  frame.metadata.erase(kSettingsKey);
+  for (const char* const own : {kSettingsKey, "nacre:key"}) frame.metadata.erase(own);
   return frame;
 }
 

@@ -60,6 +60,16 @@ TEST_F(Tiles, MayBeAnyRectangles) {
   expect_same("merged.exr", "whole.exr");
 }
 
+TEST_F(Tiles, BelongToAFrameOfAFilm) {
+  for (const char* const k : {"1", "2"})
+    render(std::string("--turntable 8 --frames 2:3 -o f.####.") + k + ".exr --tile " + k + "/2");
+  render("--turntable 8 --frames 2 -o whole.####.exr");
+  run("merge f.0002.1.exr f.0002.2.exr -o merged.exr --quiet");
+  Image merged = load_exr(folder_.file("merged.exr")), whole = load_exr(folder_.file("whole.0002.exr"));
+  EXPECT_TRUE(compare_images(merged, whole, "").identical);
+  expect_refusal("merge f.0002.1.exr f.0003.2.exr -o x.exr", 1, "nacre:settings differs");
+}
+
 TEST_F(Tiles, RefuseWhatDoesNotFit) {
   render("-o 1.exr --tile 1/2");
   render("-o 2.exr --tile 2/2");
