@@ -96,8 +96,8 @@ class SpreadPoints {
     const std::span<const std::uint32_t> near = suspects_.near((p[0] + p[1] + p[2]) / 3.0f);
     if (near.empty()) return;
     for (; static_cast<double>(k) * each_ < end; ++k) {
-      const Vec2 b = sample_uniform_triangle(sobol_2d(static_cast<std::uint32_t>(k), 0));
-      visit(p[0] + (p[1] - p[0]) * b.x + (p[2] - p[0]) * b.y, near);
+      const Vec2 w = sample_uniform_triangle(sobol_2d(static_cast<std::uint32_t>(k), 0));
+      visit(p[0] + (p[1] - p[0]) * w.x + (p[2] - p[0]) * w.y, near);
     }
   }
 
