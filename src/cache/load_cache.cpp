@@ -116,7 +116,8 @@ void read_texts(const layout::SectionReader& reader, std::uint32_t index, CacheG
   if (group.surface_area < 0)
     reader.damaged(layout::kGroup, index, "the surface area is not a number of 0 or more");
   if (first) return;
-  group.eta = parse_amount(entries[2].second);
+  // Scenes have floats, of which nine digits are enough to tell them apart.
+  group.eta = double{static_cast<float>(parse_amount(entries[2].second))};
   if (group.eta < 0) reader.damaged(layout::kGroup, index, "eta is not a number of 0 or more");
   for (std::size_t i = 3; i < entries.size(); ++i) group.lights.emplace_back().name = entries[i].second;
 }
