@@ -74,6 +74,7 @@ Bitmap decode_with_stb(const std::string& bytes, Format format, float gamma, con
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
   if (format == Format::kPng) check_png_chunks(bytes, path);
+  if (format == Format::kJpeg) check_jpeg_tables(bytes, path);
   Bitmap bitmap;
   int channels = 0;
   if (!stbi_info_from_memory(data, size, &bitmap.width, &bitmap.height, &channels) || bitmap.width <= 0 ||

@@ -1,13 +1,19 @@
-// Follows lengths without making pixels. Formats: ISO/IEC 15948 (PNG); Ward 1991, "Real Pixels", and
+// Follows lengths without making pixels. Formats: ISO/IEC 15948 (PNG); ITU-T T.81
+// (JPEG); Ward 1991, "Real Pixels", and
 // Radiance's filefmts.pdf (HDR).
 #include "scene/picture_guard.h"
 
+#include <algorithm>
 #include <string_view>
 
 #include "nacre/base/error.h"
 
 namespace nacre {
 namespace {
+
+// Markers of JPEG: those that stand alone, Huffman tables.
+constexpr int kRestart = 0xd0, kEndOfImage = 0xd9, kTemporary = 0x01, kHuffman = 0xc4;
+constexpr int kMostCodes = 256, kLengths = 16;
 
 // Widths of which scanlines may have runs.
 constexpr int kLeastRunWidth = 8, kMostRunWidth = 32767;
@@ -62,6 +68,32 @@ void check_png_chunks(const std::string& bytes, const std::string& path) {
            at, length);
     if (std::string_view(bytes).substr(at + 4, 4) == "IEND") return;
     at += kAround + length;
+  }
+}
+
+void check_jpeg_tables(const std::string& bytes, const std::string& path) {
+  const auto byte = [&](std::size_t i) {
+    return i < bytes.size() ? static_cast<unsigned char>(bytes[i]) : 0;
+  };
+  const auto check_segment = [&](std::size_t at, std::size_t end) {
+    while (at < end) {  // as stb reads them, over the end if need be
+      int codes = 0;
+      for (std::size_t i = 1; i <= kLengths; ++i) codes += byte(at + i);
+      if (codes > kMostCodes)
+        fail(ErrorCode::kSyntax, path, "damaged: the Huffman table at byte {} has {} codes", at, codes);
+      at += 1 + kLengths + static_cast<std::size_t>(codes);
+    }
+  };
+  // What is no marker is passed over: pixels, in which 0xff is followed by 0, and whatever stands between
+  // parts.
+  for (std::size_t at = 0; at + 1 < bytes.size(); ++at) {
+    const int marker = byte(at + 1);
+    if (byte(at) != 0xff || marker == 0 || marker == 0xff || marker == kTemporary ||
+        (marker >= kRestart && marker <= kEndOfImage))
+      continue;
+    const std::size_t length = static_cast<std::size_t>(byte(at + 2) << 8 | byte(at + 3));
+    if (marker == kHuffman) check_segment(at + 4, at + 2 + length);
+    at += 1 + std::max<std::size_t>(length, 2);  // to its last byte
   }
 }
 
