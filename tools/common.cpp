@@ -126,6 +126,8 @@ void add_scene_options(CLI::App& command, SceneOptions& options) {
   command.add_option("--material", options.material, "Mesh file: preset it is made of (default: Marble)");
   command.add_option("--height", options.height, "Mesh file: height of the object in mm (default: 50)")
       ->check(finite_number());
+  command.add_flag("--sandbox", options.sandbox,
+                   "Scene file: refuse files that it names outside of its own folder");
 }
 
 Scene load_scene(const SceneOptions& options, Session& session) {
@@ -146,7 +148,8 @@ Scene load_scene(const SceneOptions& options, Session& session) {
       throw UsageError("--material goes with a mesh file; a scene file names its own");
     if (options.height)
       throw UsageError("--height goes with a mesh file; shapes of a scene file have the size they have");
-    scene = nacre::load_scene(options.path, parse_defines(options.defines));
+    scene = nacre::load_scene(options.path, parse_defines(options.defines),
+                              options.sandbox ? SceneFiles::kOwnFolder : SceneFiles::kAnywhere);
   }
   session.warn(scene.warnings);
   session.warn(check_validity(scene));

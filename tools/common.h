@@ -65,6 +65,7 @@ struct SceneOptions {
   std::string path, material;
   std::optional<double> height;  // none: kDefaultHeight
   std::vector<std::string> defines;
+  bool sandbox = false;
 };
 inline constexpr double kDefaultHeight = 50;  // mm
 void add_scene_options(CLI::App& command, SceneOptions& options);

@@ -52,7 +52,8 @@ Image shrink(const Image& image, int edge) {
   small.full_height = small.height = (image.height + factor - 1) / factor;
   for (const char* const name : {"R", "G", "B"}) {
     const Channel* const from = find_channel(image, name);
-    Channel& to = small.channels.emplace_back(name, std::vector<float>{});
+    Channel& to = small.channels.emplace_back();
+    to.name = name;
     if (!from) continue;
     for (int y = 0; y < small.height; ++y)
       for (int x = 0; x < small.width; ++x) {

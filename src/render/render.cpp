@@ -183,8 +183,9 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
     image.full_width = image.width = static_cast<int>(radiances.size());
     image.full_height = image.height = 1;
     for (int k = 0; k < 3; ++k) {
-      Channel& channel = image.channels.emplace_back(std::string(1, "RGB"[k]), std::vector<float>{});
+      Channel channel{std::string(1, "RGB"[k]), {}};
       for (const Rgb& radiance : radiances) channel.values.push_back(radiance[k]);
+      image.channels.push_back(std::move(channel));
     }
     return image;
   };

@@ -106,7 +106,7 @@ EnvironmentMap read_envmap(Parameters& parameters) {
   parameters.boolean("cache", false);  // of mip maps; there are none here
   EnvironmentMap map;
   map.to_world = read_rotation(parameters);
-  const std::string path = resolve_path(name, parameters.plugin().file);
+  const std::string path = resolve_path(name, parameters.plugin());
   map.radiance = load_bitmap(path, place, gamma);
   for (Rgb& texel : map.radiance.texels) {
     // Filters that sharpen leave a little less than nothing beside what is bright.

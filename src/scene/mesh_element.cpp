@@ -28,7 +28,7 @@ ShapeMesh load_mesh_of_type(Parameters& parameters, const std::string& type, War
   if (!to_lower(name).ends_with("." + type))
     fail(ErrorCode::kValue, place, "'{}' is not a .{} file: {} reads no other", name, type,
          parameters.name());
-  const std::string path = resolve_path(name, parameters.plugin().file);
+  const std::string path = resolve_path(name, parameters.plugin());
   try {
     if (type != "serialized") return {load_mesh(path, warnings)};
     const int index = parameters.integer("shapeIndex", 0, 0, std::numeric_limits<int>::max());

@@ -380,10 +380,10 @@ void Builder::add_default_camera() {
 
 }  // namespace
 
-Scene load_scene(const std::string& path, const Defines& defines) {
+Scene load_scene(const std::string& path, const Defines& defines, SceneFiles files) {
   Scene scene;
   scene.path = path;
-  const XmlElement root = load_scene_xml(path, defines, scene.warnings);
+  const XmlElement root = load_scene_xml(path, defines, scene.warnings, files);
   Builder(scene, root).build();
   return scene;
 }

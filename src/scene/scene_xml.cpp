@@ -91,9 +91,17 @@ std::string excerpt(std::string_view text) {
   return text.size() > 40 ? line + "..." : line;
 }
 
+// Where a path leads. One that cannot be followed (a circle of links, a folder that may not be read) leads
+// nowhere.
+fs::path resolve_links(const fs::path& path) {
+  std::error_code error;
+  fs::path result = fs::weakly_canonical(path, error);
+  return error ? fs::path() : result;
+}
+
 class Loader {
  public:
-  explicit Loader(const Defines& defines) : values_(defines) {
+  Loader(const Defines& defines, std::string sandbox) : values_(defines), sandbox_(std::move(sandbox)) {
     for (const auto& [name, value] : defines) check_name(name, "-D " + excerpt(name));
   }
 
@@ -167,6 +175,7 @@ class Loader {
   }
 
   Defines values_;
+  std::string sandbox_;
   std::set<std::string> used_;
   std::vector<std::string> open_files_;
   std::size_t tree_bytes_ = 0;
@@ -177,9 +186,10 @@ void Loader::convert(pugi::xml_node node, const Source& source, int depth, XmlEl
   if (element.tag == "lookAt") element.tag = "lookat";
   element.file = source.path;
   element.line = source.line(node.offset_debug());
+  element.sandbox = sandbox_;
   if (depth > kMaxDepth)
     fail(ErrorCode::kLimit, element.place(), "elements are nested more than {} deep", kMaxDepth);
-  charge(sizeof(XmlElement) + source.path.size(), element);
+  charge(sizeof(XmlElement) + source.path.size() + sandbox_.size(), element);
   for (const pugi::xml_attribute attribute : node.attributes()) {
     element.attributes.emplace_back(attribute.name(), expand(attribute.value(), element.place()));
     charge(64 + element.attributes.back().second.size(), element);
@@ -204,7 +214,7 @@ void Loader::convert(pugi::xml_node node, const Source& source, int depth, XmlEl
       check_name(child.get("name"), child.place());
       values_.emplace(child.get("name"), child.get("value"));  // a value that is there already wins
     } else {
-      load(resolve_path(child.get("filename"), child.file), child.place(), element);
+      load(resolve_path(child.get("filename"), child), child.place(), element);
     }
   }
 }
@@ -245,8 +255,11 @@ const std::string& XmlElement::get(std::string_view attribute) const {
   return found == attributes.end() ? none : found->second;
 }
 
-XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings) {
-  Loader loader(defines);
+XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
+                          SceneFiles files) {
+  std::string sandbox;
+  if (files == SceneFiles::kOwnFolder) sandbox = resolve_links(fs::absolute(path).parent_path()).string();
+  Loader loader(defines, sandbox);
   XmlElement scene;
   loader.load(path, "", scene);
   for (const auto& [name, value] : defines)
@@ -255,8 +268,16 @@ XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warni
   return scene;
 }
 
-std::string resolve_path(const std::string& name, const std::string& file) {
-  return (fs::path(file).parent_path() / name).string();
+std::string resolve_path(const std::string& name, const XmlElement& element) {
+  const fs::path path = fs::path(element.file).parent_path() / name;
+  if (!element.sandbox.empty()) {
+    const fs::path inside = resolve_links(fs::absolute(path)).lexically_relative(element.sandbox);
+    if (inside.empty() || *inside.begin() == "..")
+      fail(ErrorCode::kValue, element.place(),
+           "'{}' lies outside of {}: --sandbox keeps to the scene's own folder", excerpt(name),
+           element.sandbox);
+  }
+  return path.string();
 }
 
 }  // namespace nacre

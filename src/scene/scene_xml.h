@@ -15,6 +15,7 @@ struct XmlElement {
   std::string tag;  // "lookAt" of older files is "lookat" here
   std::string file;
   std::size_t line = 0;
+  std::string sandbox;  // folder that files named here have to lie in; "": anywhere
   std::vector<std::pair<std::string, std::string>> attributes;
   std::vector<XmlElement> children;
 
@@ -27,10 +28,13 @@ struct XmlElement {
 
 /// Reads a file and what it includes into one <scene>. Throws Error with "file:line" for what is not XML, an
 /// element or attribute that scenes do not have, a required attribute that is missing, an undefined $name,
-/// and includes that are missing, circular or too many. Warns of a define that no $name uses.
-XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings);
+/// and includes that are missing, circular or too many. Warns of a define that no $name uses. `files` says
+/// which files it and its elements may name.
+XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
+                          SceneFiles files = SceneFiles::kAnywhere);
 
-/// `name` as written in a file, relative to the folder of `file`.
-std::string resolve_path(const std::string& name, const std::string& file);
+/// `name` as written in an element, relative to the folder of the element's file. Throws Error(kValue) at the
+/// element if it, or what a symbolic link makes of it, lies outside of the element's sandbox.
+std::string resolve_path(const std::string& name, const XmlElement& element);
 
 }  // namespace nacre

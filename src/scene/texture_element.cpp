@@ -38,7 +38,7 @@ BitmapTexture read_bitmap(Parameters& parameters, Warnings& warnings) {
   if (gamma < 0 && gamma != kGammaSrgb)
     fail(ErrorCode::kValue, parameters.place("gamma"),
          "gamma is {}, it has to be -1 for sRGB, 0 for what the format has, or a positive exponent", gamma);
-  texture.bitmap = load_bitmap(resolve_path(name, parameters.plugin().file), place, gamma);
+  texture.bitmap = load_bitmap(resolve_path(name, parameters.plugin()), place, gamma);
   clamp_texels(texture.bitmap, place, warnings);
   return texture;
 }

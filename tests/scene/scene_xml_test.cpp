@@ -120,6 +120,53 @@ TEST(SceneLimits, DeepNestingIsRefused) {
   EXPECT_EQ(code_of(folder, deep + "</scene>"), ErrorCode::kLimit);
 }
 
+// With a sandbox, no way leads out of the scene's folder: not a path, and not a symbolic link.
+TEST(SceneSandbox, KeepsToTheFolderOfTheScene) {
+  const SceneFolder folder;
+  const std::string outside = folder.write("outside/leaf.xml", R"(<scene><shape type="cube"/></scene>)");
+  const std::string mesh = folder.write("outside/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  folder.write("home/below/leaf.xml", R"(<scene><include filename="../leaf.xml"/></scene>)");
+  folder.write("home/leaf.xml", R"(<scene><shape type="cube"/></scene>)");
+  std::filesystem::create_symlink("../outside", folder.path() + "/home/out");
+  std::filesystem::create_symlink("../outside/a.obj", folder.path() + "/home/a.obj");
+  std::filesystem::create_symlink("circle.xml", folder.path() + "/home/circle.xml");
+  std::filesystem::create_symlink("home", folder.path() + "/door");
+  const auto refusal = [&](const std::string& body, const char* home, SceneFiles files) {
+    folder.write("home/main.xml", "<scene>\n" + body + "</scene>");
+    try {
+      load_scene(folder.path() + home, {}, files);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const auto include = [](const std::string& file) { return "<include filename=\"" + file + "\"/>"; };
+  const auto shape = [](const std::string& type, const std::string& file) {
+    return "<shape type=\"" + type + "\"><string name=\"filename\" value=\"" + file + "\"/></shape>";
+  };
+  const std::string map =
+      R"(<shape type="cube"/><emitter type="envmap"><string name="filename" value="/etc/x.exr"/></emitter>)";
+  const std::string texture =
+      R"(<shape type="cube"><bsdf type="diffuse"><texture name="reflectance" type="bitmap">
+                                 <string name="filename" value="../outside/x.png"/></texture></bsdf></shape>)";
+  for (const char* const home : {"/home/main.xml", "/door/main.xml"}) {
+    for (const std::string& body :
+         {include("../outside/leaf.xml"), include(outside), include("out/leaf.xml"),
+          include("below/../../outside/leaf.xml"), include("circle.xml"), shape("obj", "a.obj"),
+          shape("obj", mesh), shape("serialized", "/dev/x.serialized"), map, texture}) {
+      const std::string what = refusal(body, home, SceneFiles::kOwnFolder);
+      EXPECT_NE(what.find("main.xml:2"), std::string::npos) << what << body;
+      EXPECT_NE(what.find("--sandbox"), std::string::npos) << what << body;
+    }
+    for (const std::string& body :
+         {include("leaf.xml"), include("below/leaf.xml"), include(folder.path() + "/home/leaf.xml")})
+      EXPECT_EQ(refusal(body, home, SceneFiles::kOwnFolder), "") << body;
+    for (const std::string& body :
+         {include("../outside/leaf.xml"), include("out/leaf.xml"), shape("obj", "a.obj")})
+      EXPECT_EQ(refusal(body, home, SceneFiles::kAnywhere), "") << body;
+  }
+}
+
 TEST(SceneXml, NulBytesEmptyFilesAndFoldersAreErrors) {
   const SceneFolder folder;
   EXPECT_EQ(code_of(folder, std::string("<scene>\0</scene>", 16)), ErrorCode::kSyntax);
