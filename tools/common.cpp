@@ -50,7 +50,7 @@ Session::Session(const CommonOptions& options, std::string command)
 }
 
 void Session::warn(const Warnings& warnings) {
-  for (const std::string& warning : warnings) fmt::print(stderr, "nacre: warning: {}\n", warning);
+  for (const std::string& warning : warnings) print_message(fmt::format("nacre: warning: {}\n", warning));
 }
 
 void Session::finish() {

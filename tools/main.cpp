@@ -1,11 +1,16 @@
 // The program: subcommands, errors, exit codes.
 #include <malloc.h>
 
-#include <csignal>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <new>
+#include <system_error>
 
 #include "common.h"
 #include "nacre/base/error.h"
+#include "nacre/base/progress.h"
+#include "nacre/base/signals.h"
 #include "nacre/base/version.h"
 
 namespace {
@@ -17,18 +22,15 @@ std::string join_arguments(int argc, char** argv) {
 }
 
 int report_error(const std::string& message, int code) {
-  fmt::print(stderr, "nacre: error: {}\n", message);
+  nacre::print_message(fmt::format("nacre: error: {}\n", message));
   return code;
 }
 
-}  // namespace
+int report_output(int number) {
+  return report_error(fmt::format("standard output: cannot write: {}", std::strerror(number)), 1);
+}
 
-int main(int argc, char** argv) {
-  // Memory that is given back is soon wanted again: keep it, rather than have the system clear it each time.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
-  // A closed pipe is an error like any other, not a silent death.
-  std::signal(SIGPIPE, SIG_IGN);
+int run(int argc, char** argv) {
   CLI::App app{
       "nacre renders translucent materials: bake irradiance once, render from any camera with any material"};
   app.set_version_flag("--version", std::string("nacre ") + nacre::kVersion);
@@ -59,7 +61,23 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return report_error(
         "out of memory; use fewer samples (--spacing, --points) or a smaller picture (--size)", 1);
+  } catch (const std::system_error& error) {
+    if (std::ferror(stdout)) return report_output(error.code().value());
+    return report_error(error.what(), 1);
   } catch (const std::exception& error) {
     return report_error(error.what(), 1);
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  nacre::handle_signals();
+  // Memory that is given back is soon wanted again: keep it, rather than have the system clear it each time.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  const int code = run(argc, argv);
+  // What was printed may still have to be written.
+  if (std::fflush(stdout) == 0 || code != 0) return code;
+  return report_output(errno);
 }

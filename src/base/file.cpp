@@ -1,4 +1,4 @@
-// Temporary file, sync, rename.
+// Nameless file, sync, name, rename.
 #include "nacre/base/file.h"
 
 #include <fcntl.h>
@@ -10,6 +10,9 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <utility>
+
+#include "base/files_in_use.h"
 
 namespace nacre {
 namespace {
@@ -32,35 +35,80 @@ std::string follow_links(const std::string& path) {
   fail_io(path, "write");
 }
 
+std::string folder_of(const std::string& path) {
+  const auto folder = std::filesystem::path(path).parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+std::string link_to(int descriptor) { return fmt::format("/proc/self/fd/{}", descriptor); }
+
 }  // namespace
 
+struct AtomicFile::Temporary {
+  explicit Temporary(const std::string& target) : path(next_name(target)) {}
+  static std::string next_name(const std::string& target) {
+    static std::atomic<unsigned> serial{0};
+    return fmt::format("{}.tmp-{}-{}", target, ::getpid(), serial++);
+  }
+  std::string path;
+  FileInUse in_use = FileInUse::temporary(path);
+};
+
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follow_links(path_)) {
-  static std::atomic<unsigned> serial{0};
   struct stat status;
   if (::stat(target_.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) {
       errno = EISDIR;
       fail_io(path_, "write");
     }
-    if (S_ISCHR(status.st_mode)) {
-      descriptor_ = ::open(target_.c_str(), O_RDWR | O_CLOEXEC | O_NOCTTY);
-      if (descriptor_ < 0) fail_io(path_, "write");
-      return;
-    }
-    if (!S_ISREG(status.st_mode))
+    device_ = S_ISCHR(status.st_mode);
+    if (!device_ && !S_ISREG(status.st_mode))
       fail(ErrorCode::kIo, path_, "cannot write: it is not a regular file; give the name of one");
   }
-  // Another machine, or a process that was killed, may have left one of the same number.
+  if (device_) {
+    descriptor_ = ::open(target_.c_str(), O_RDWR | O_CLOEXEC | O_NOCTTY);
+    if (descriptor_ < 0) fail_io(path_, "write");
+    return;
+  }
+  descriptor_ = ::open(folder_of(target_).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
+  if (descriptor_ >= 0 && ::access(link_to(descriptor_).c_str(), F_OK) != 0) {
+    ::close(descriptor_);  // no /proc: it could never get a name
+    descriptor_ = -1;
+  }
+  if (descriptor_ < 0) create_named();
+}
+
+// Another machine, or a process that was killed, may have left one of the same number.
+void AtomicFile::create_named() {
   do {
-    temporary_ = fmt::format("{}.tmp-{}-{}", target_, ::getpid(), serial++);
-    descriptor_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    temporary_ = std::make_unique<Temporary>(target_);
+    descriptor_ = ::open(temporary_->path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   } while (descriptor_ < 0 && errno == EEXIST);
-  if (descriptor_ < 0) fail_io(path_, "write");
+  if (descriptor_ >= 0) return;
+  const int error = errno;
+  temporary_.reset();  // it is somebody else's, if anybody's
+  errno = error;
+  fail_io(path_, "write");
+}
+
+// A file cannot be linked over another one, only renamed.
+void AtomicFile::give_name() {
+  int result = 0;
+  do {
+    temporary_ = std::make_unique<Temporary>(target_);
+    result = ::linkat(AT_FDCWD, link_to(descriptor_).c_str(), AT_FDCWD, temporary_->path.c_str(),
+                      AT_SYMLINK_FOLLOW);
+  } while (result != 0 && errno == EEXIST);
+  if (result == 0) return;
+  const int error = errno;
+  temporary_.reset();
+  errno = error;
+  fail_io(path_, "write");
 }
 
 AtomicFile::~AtomicFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (temporary_) ::unlink(temporary_->path.c_str());
 }
 
 void AtomicFile::write(const void* data, std::size_t bytes) {
@@ -74,23 +122,28 @@ void AtomicFile::write(const void* data, std::size_t bytes) {
   }
 }
 
+void AtomicFile::seek(std::uint64_t position) {
+  if (::lseek(descriptor_, static_cast<off_t>(position), SEEK_SET) < 0) fail_io(path_, "write");
+}
+
 void AtomicFile::commit() {
-  const bool device = temporary_.empty();
-  if (!device && ::fsync(descriptor_) != 0) fail_io(path_, "write");
+  MappedFile::check_unchanged();
+  if (!device_) {
+    if (::fsync(descriptor_) != 0) fail_io(path_, "write");
+    if (!temporary_) give_name();
+  }
   const int descriptor = descriptor_;
   descriptor_ = -1;
   if (::close(descriptor) != 0) fail_io(path_, "write");
-  if (device) return;
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail_io(path_, "write");
-  temporary_.clear();
+  if (device_) return;
+  if (::rename(temporary_->path.c_str(), target_.c_str()) != 0) fail_io(path_, "write");
+  temporary_.reset();
   // The rename itself has to reach the disk too; a file system that cannot sync a folder is no reason to
   // fail.
-  const auto folder = std::filesystem::path(target_).parent_path();
-  const int folder_descriptor =
-      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder_descriptor >= 0) {
-    ::fsync(folder_descriptor);
-    ::close(folder_descriptor);
+  const int folder = ::open(folder_of(target_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder >= 0) {
+    ::fsync(folder);
+    ::close(folder);
   }
 }
 

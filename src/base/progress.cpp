@@ -16,6 +16,8 @@ std::string format_time(double seconds) {
 
 }  // namespace
 
+void print_message(const std::string& text) noexcept { std::fputs(text.c_str(), stderr); }
+
 void Progress::begin(std::string stage, std::string unit, std::uint64_t total) {
   const std::lock_guard lock(mutex_);
   stage_ = std::move(stage);
@@ -47,13 +49,13 @@ void Progress::end() {
 void Progress::say(const std::string& line) {
   const std::lock_guard lock(mutex_);
   if (!shows_progress()) return;
-  fmt::print(stderr, "{}{}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line);
+  print_message(fmt::format("{}{}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line));
 }
 
 void Progress::warn(const std::string& line) {
   const std::lock_guard lock(mutex_);
   if (style_ == ProgressStyle::kSilent) return;
-  fmt::print(stderr, "{}nacre: warning: {}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line);
+  print_message(fmt::format("{}nacre: warning: {}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line));
 }
 
 void Progress::print(bool final) {
@@ -63,18 +65,18 @@ void Progress::print(bool final) {
       total_ ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total_)) : 1.0;
   const char* start = style_ == ProgressStyle::kBar ? "\r\033[K" : "";
   if (final) {
-    fmt::print(stderr, "{}{}: {} {} in {:.2f} s\n", start, stage_, total_, unit_, elapsed);
+    print_message(fmt::format("{}{}: {} {} in {:.2f} s\n", start, stage_, total_, unit_, elapsed));
     return;
   }
   const std::string left = fraction > 0 ? format_time(elapsed * (1 - fraction) / fraction) : "?";
   if (style_ == ProgressStyle::kBar) {
     constexpr int kWidth = 30;
     const int filled = static_cast<int>(fraction * kWidth);
-    fmt::print(stderr, "{}{} [{:=>{}}{:->{}}] {:3.0f} %  {} left", start, stage_, "", filled, "",
-               kWidth - filled, 100 * fraction, left);
+    print_message(fmt::format("{}{} [{:=>{}}{:->{}}] {:3.0f} %  {} left", start, stage_, "", filled, "",
+                              kWidth - filled, 100 * fraction, left));
     std::fflush(stderr);
   } else {
-    fmt::print(stderr, "{}: {:.0f} %, {} left\n", stage_, 100 * fraction, left);
+    print_message(fmt::format("{}: {:.0f} %, {} left\n", stage_, 100 * fraction, left));
   }
 }
 

@@ -3,8 +3,6 @@
 #include "cache/section_file.h"
 
 #include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -19,47 +17,6 @@ namespace nacre::layout {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "files are little-endian and used in place");
-
-// A read-only private mapping of a whole file.
-class MappedFile {
- public:
-  MappedFile(const std::string& path, const char* name) {
-    // Not blocking: a pipe has to be refused, not waited for.
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (descriptor < 0) {
-      const int error = errno;
-      fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path,
-           "cannot read the {}: {}", name, std::strerror(error));
-    }
-    struct stat status;
-    if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-      ::close(descriptor);
-      fail(ErrorCode::kNotACache, path, "is not a regular file");
-    }
-    size_ = static_cast<std::uint64_t>(status.st_size);
-    if (size_ > 0) {
-      void* address = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
-      const int error = errno;
-      ::close(descriptor);
-      if (address == MAP_FAILED)
-        fail(ErrorCode::kIo, path, "cannot map the {}: {}", name, std::strerror(error));
-      data_ = static_cast<const unsigned char*>(address);
-    } else {
-      ::close(descriptor);
-    }
-  }
-  ~MappedFile() {
-    if (data_) ::munmap(const_cast<unsigned char*>(data_), size_);
-  }
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-  const unsigned char* data() const { return data_; }
-  std::uint64_t size() const { return size_; }
-
- private:
-  const unsigned char* data_ = nullptr;
-  std::uint64_t size_ = 0;
-};
 
 std::string text_of(Kind kind) {
   std::string text;
@@ -80,7 +37,7 @@ SectionReader::SectionReader(std::string path, std::span<const FileKind> version
     : path_(std::move(path)), versions_(versions), file_kind_(&versions.back()) {
   const auto file = std::make_shared<MappedFile>(path_, file_kind_->name);
   storage_ = file;
-  file_ = {file->data(), file->size()};
+  file_ = file->bytes();
   check_header();
   check_table();
 }

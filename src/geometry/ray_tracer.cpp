@@ -20,9 +20,10 @@ struct ReleaseScene {
 
 void check(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_NONE) return;
+  if (error == RTC_ERROR_NONE && device != nullptr) return;
   if (error == RTC_ERROR_OUT_OF_MEMORY)
-    fail(ErrorCode::kLimit, "", "not enough memory to build the ray tracer: use smaller meshes");
+    fail(ErrorCode::kLimit, "",
+         "not enough memory to build the ray tracer; raise the limit or use smaller meshes");
   fail(ErrorCode::kIo, "", "Embree failed with error {}", static_cast<int>(error));
 }
 
@@ -76,9 +77,7 @@ RayTracer::RayTracer(std::span<const Mesh* const> meshes, std::span<const std::u
   impl_ = impl;
   impl->device.reset(rtcNewDevice(nullptr));
   const RTCDevice device = impl->device.get();
-  if (device == nullptr)
-    fail(ErrorCode::kIo, "", "Embree does not start (error {})",
-         static_cast<int>(rtcGetDeviceError(nullptr)));
+  if (device == nullptr) check(device);
   impl->scene.reset(rtcNewScene(device));
   const RTCScene scene = impl->scene.get();
   check(device);

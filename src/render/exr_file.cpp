@@ -9,7 +9,6 @@
 #include <ImfStringAttribute.h>
 #include <ImfThreading.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -40,8 +39,7 @@ int match_threads() {
 // OpenEXR's view of an AtomicFile. It keeps the first error, because OpenEXR's destructors swallow theirs.
 class OutputStream final : public Imf::OStream {
  public:
-  OutputStream(AtomicFile& file, const std::string& path)
-      : Imf::OStream(path.c_str()), file_(file), path_(path) {}
+  OutputStream(AtomicFile& file, const std::string& path) : Imf::OStream(path.c_str()), file_(file) {}
 
   void write(const char data[], int bytes) override {
     guard([&] { file_.write(data, static_cast<std::size_t>(bytes)); });
@@ -49,10 +47,7 @@ class OutputStream final : public Imf::OStream {
   }
   std::uint64_t tellp() override { return position_; }
   void seekp(std::uint64_t position) override {
-    guard([&] {
-      if (::lseek(file_.descriptor(), static_cast<off_t>(position), SEEK_SET) < 0)
-        fail(ErrorCode::kIo, path_, "cannot write: {}", std::strerror(errno));
-    });
+    guard([&] { file_.seek(position); });
     position_ = position;
   }
   void rethrow_error() const {
@@ -71,7 +66,6 @@ class OutputStream final : public Imf::OStream {
   }
 
   AtomicFile& file_;
-  const std::string& path_;
   std::uint64_t position_ = 0;
   std::exception_ptr error_;
 };

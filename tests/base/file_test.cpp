@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -48,16 +49,39 @@ TEST_F(AtomicFileTest, AppearsWhenCommitted) {
 }
 
 TEST_F(AtomicFileTest, PassesOverWhatIsLeftOfOthers) {
-  const auto serial_of = [](const AtomicFile& file) {
-    const std::string& name = file.temporary_path();
-    return std::stoul(name.substr(name.rfind('-') + 1));
-  };
-  const AtomicFile first(path("a"));
-  const std::string stem = first.temporary_path().substr(0, first.temporary_path().rfind('-') + 1);
-  const unsigned long next = serial_of(first) + 1;
-  std::ofstream(stem + std::to_string(next)) << "left";
-  EXPECT_EQ(serial_of(AtomicFile(path("a"))), next + 1);
-  EXPECT_EQ(read_text_file(stem + std::to_string(next)), "left");
+  const auto left = [&](int serial) { return fmt::format("{}.tmp-{}-{}", path("a"), ::getpid(), serial); };
+  for (int i = 0; i < 100; ++i) std::ofstream(left(i)) << "left";
+  save(path("a"), "new");
+  EXPECT_EQ(read_text_file(path("a")), "new");
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(read_text_file(left(i)), "left");
+  EXPECT_EQ(entries(), 101u);
+}
+
+TEST_F(AtomicFileTest, HasTheModeThatTheUserWants) {
+  const mode_t before = ::umask(027);
+  save(path("a"), "x");
+  ::umask(before);
+  EXPECT_EQ(fs::status(path("a")).permissions(), fs::perms{0640});
+}
+
+// A file that is replaced by renaming is another one; a file that is written to is not what was computed
+// from.
+TEST_F(AtomicFileTest, NothingIsMadeOfWhatChanges) {
+  save(path("in"), "first");
+  {
+    const MappedFile in(path("in"), "file");
+    save(path("in"), "other");
+    EXPECT_NO_THROW(save(path("out"), "made"));
+    EXPECT_EQ(in.bytes()[0], 'f');
+  }
+  {
+    const MappedFile in(path("in"), "file");
+    std::ofstream(path("in"), std::ios::app) << "more";
+    EXPECT_THROW(save(path("out"), "of both"), Error);
+  }
+  EXPECT_EQ(read_text_file(path("out")), "made");
+  EXPECT_NO_THROW(save(path("out"), "made again"));
+  EXPECT_EQ(entries(), 2u);
 }
 
 TEST_F(AtomicFileTest, SymbolicLinksStay) {

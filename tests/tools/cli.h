@@ -54,10 +54,9 @@ struct ProgramResult {
   }
 };
 
-/// `nacre ARGUMENTS` by the shell, in `folder`.
-inline ProgramResult run_nacre(const TemporaryFolder& folder, const std::string& arguments) {
-  const std::string command =
-      "cd '" + folder.path().string() + "' && '" NACRE_PROGRAM "' " + arguments + " 2>&1 < /dev/null";
+/// A command of the shell, in `folder`.
+inline ProgramResult run_shell(const TemporaryFolder& folder, const std::string& shell_command) {
+  const std::string command = "cd '" + folder.path().string() + "' && " + shell_command + " 2>&1 < /dev/null";
   ProgramResult result{-1, ""};
   FILE* pipe = ::popen(command.c_str(), "r");
   if (!pipe) return result;
@@ -67,6 +66,11 @@ inline ProgramResult run_nacre(const TemporaryFolder& folder, const std::string&
   const int status = ::pclose(pipe);
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
+}
+
+/// `nacre ARGUMENTS` by the shell, in `folder`.
+inline ProgramResult run_nacre(const TemporaryFolder& folder, const std::string& arguments) {
+  return run_shell(folder, "'" NACRE_PROGRAM "' " + arguments);
 }
 
 inline std::string read_file(const std::string& path) {

@@ -11,6 +11,9 @@
 
 namespace nacre {
 
+/// Prints on standard error. Where that is closed or on a full disk nobody can be told, and work goes on.
+void print_message(const std::string& text) noexcept;
+
 enum class ProgressStyle { kSilent, kWarnings, kLines, kBar };
 
 /// Shared by the threads of one stage after another. Writes to standard error.
