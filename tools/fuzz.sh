@@ -24,7 +24,7 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
 targets=("$@")
 if ((${#targets[@]} == 0)); then
-  targets=(scene obj ply stl off serialized cache exitance cloud image bitmap plan_csv plan_json)
+  targets=(scene obj ply stl off serialized cache exitance cloud image bitmap plan_csv plan_json camera_path)
 fi
 
 if ! command -v clang++ >/dev/null; then
@@ -33,6 +33,9 @@ if ! command -v clang++ >/dev/null; then
 fi
 [[ -f build/fuzz/build.ninja ]] || cmake --preset fuzz >/dev/null
 cmake --build build/fuzz --target "${targets[@]/#/fuzz_}" >/dev/null
+
+# What AddressSanitizer keeps of the memory that is free counts towards the limit.
+export ASAN_OPTIONS="quarantine_size_mb=16:allocator_release_to_os_interval_ms=200:${ASAN_OPTIONS:-}"
 
 # Golden files are seeds, too.
 seeds_of() {

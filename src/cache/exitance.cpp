@@ -212,18 +212,19 @@ void Exitance::eval_whole(std::span<const Vec3> points, std::span<Rgb> exitance,
 void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
                            bool whole) const {
   if (nodes_.empty()) return eval_exact(points, exitance, evaluations);
+  const std::vector<Vec3> places = scaled(points);
   std::vector<Point> order;
   order.reserve(points.size());
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     if (in_grid(points[i]))
       order.push_back({cell_code(points[i]), i});
     else  // far away from all samples, where no surface is
-      eval_exact(points.subspan(i, 1), exitance.subspan(i, 1), evaluations);
+      sum_exactly(std::span(places).subspan(i, 1), exitance.subspan(i, 1), evaluations);
   }
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
   });
-  Room room{points, exitance, whole, {}, {}, {}, {}, 0};
+  Room room{places, exitance, whole, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)
@@ -234,8 +235,19 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   evaluations += room.evaluations;
 }
 
+std::vector<Vec3> Exitance::scaled(std::span<const Vec3> points) const {
+  std::vector<Vec3> result(points.begin(), points.end());
+  for (Vec3& point : result) point *= unit_;
+  return result;
+}
+
 void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
                           std::uint64_t& evaluations) const {
+  sum_exactly(scaled(points), exitance, evaluations);
+}
+
+void Exitance::sum_exactly(std::span<const Vec3> points, std::span<Rgb> exitance,
+                           std::uint64_t& evaluations) const {
   constexpr std::size_t kChunk = 4096;
   std::vector<std::array<double, 3>> totals(points.size());
   SourceList list;

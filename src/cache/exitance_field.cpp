@@ -16,10 +16,6 @@ namespace {
 
 enum BlockState : std::uint8_t { kEmpty, kBusy, kFull };
 
-// A patch over which M_o bends by more than this share of itself, or changes so much along an edge, may err
-// by more than the tolerance: light there is as narrow as a mean free path.
-constexpr float kMostBend = 0.08f, kMostChange = 0.4f;
-
 Rgb to_rgb(Float4 v) noexcept { return {v[0], v[1], v[2]}; }
 Float4 larger(Float4 a, Float4 b) noexcept { return a > b ? a : b; }
 Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
@@ -173,10 +169,10 @@ bool ExitanceField::is_steep(const Patch& patch) const noexcept {
     const Float4 a = values_[patch.nodes[i]], b = values_[patch.nodes[(i + 1) % 3]];
     const Float4 mean = (a + b) * broadcast(0.5f);
     if (patch.nodes[3 + i] == kNone) {
-      if (exceeds(magnitude(a - b), mean * broadcast(kMostChange))) return true;
+      if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
     } else {
       const Float4 middle = values_[patch.nodes[3 + i]];
-      if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(kMostBend))) return true;
+      if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(most_bend_))) return true;
     }
   }
   return false;

@@ -185,8 +185,15 @@ double ExitanceField::predict_nodes(std::span<const Mesh* const> meshes, double 
   return nodes;
 }
 
-ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance)
-    : exitance_(exitance), meshes_(std::move(meshes)) {
+// A patch over which M_o bends by more than a share of itself, or changes so much along an edge, may err by
+// more than the tolerance: light there is as narrow as a mean free path. Errors grow like the bend to 3/2 and
+// the square of the change.
+ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance,
+                             double tolerance)
+    : exitance_(exitance),
+      meshes_(std::move(meshes)),
+      most_bend_(static_cast<float>(0.08 * std::pow(strictness(tolerance), 2.0 / 3))),
+      most_change_(static_cast<float>(0.4 * std::sqrt(strictness(tolerance)))) {
   std::size_t vertices = 0;
   for (const Mesh* const mesh : meshes_)
     if (mesh) vertices += mesh->positions.size();

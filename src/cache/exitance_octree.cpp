@@ -53,19 +53,33 @@ struct Exitance::Grains {
     const SumNode node = make_node(from);
     return allowed > 0 && node.spread * bend + node.lean * slope <= allowed;
   }
-  Below below(const OctreeNode& from, std::span<const OctreeNode> nodes) const noexcept {
+  Below below(const Exitance& sum, std::uint32_t index) const noexcept {
+    const OctreeNode from = sum.make_octree_node(index);
     if (contain(from)) return Below::kItself;
     if (from.child_count() == 0) return Below::kSamples;
-    const auto children = nodes.subspan(from.first_child, from.child_count());
-    const bool all = std::ranges::all_of(children, [&](const OctreeNode& child) { return contain(child); });
-    return all ? Below::kGrains : Below::kChildren;
+    for (std::uint32_t c = 0; c < from.child_count(); ++c)
+      if (!contain(sum.make_octree_node(from.first_child + c))) return Below::kChildren;
+    return Below::kGrains;
   }
 };
 
 SumSource Exitance::make_source(std::size_t sample) const noexcept {
-  const Vec3 p = group_.position(sample);
-  const Rgb power = group_.irradiance(sample) * group_.area(sample);
+  const Vec3 p = unit_ * group_.position(sample);
+  const Rgb power = group_.irradiance(sample) * (unit_ * unit_ * group_.area(sample));
   return {p.x, p.y, p.z, 0, Float4{power.x, power.y, power.z, 0}};
+}
+
+OctreeNode Exitance::make_octree_node(std::uint32_t index) const noexcept {
+  OctreeNode node = group_.nodes[index];
+  const float area = unit_ * unit_;
+  node.radius *= unit_;
+  for (std::size_t i = 0; i < 3; ++i) {
+    node.centre[i] *= unit_;
+    node.power[i] *= area;
+    node.first_moment[i] *= area * unit_;
+    node.second_moment[i] *= area * area;
+  }
+  return node;
 }
 
 // None where each sample has to be certain, or counts by itself.
@@ -100,8 +114,7 @@ void Exitance::copy_octree() {
   for (std::uint32_t begin = 0, source = 0; !level.empty(); level.swap(next)) {
     places.resize(level.size());
     parallel_for(level.size(), kRun, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i)
-        places[i].below = grains.below(group_.nodes[level[i]], group_.nodes);
+      for (std::size_t i = first; i < last; ++i) places[i].below = grains.below(*this, level[i]);
     });
     const auto end = begin + static_cast<std::uint32_t>(level.size());
     std::uint32_t child = end;
@@ -126,7 +139,7 @@ void Exitance::copy_octree() {
     next.resize(child - end);
     parallel_for(level.size(), kRun, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) {
-        const OctreeNode& from = group_.nodes[level[i]];
+        const OctreeNode from = make_octree_node(level[i]);
         const Place& place = places[i];
         SumNode node = make_node(from);
         node.first = place.source;
@@ -141,7 +154,7 @@ void Exitance::copy_octree() {
           case Below::kGrains:
             node.packed_counts = from.child_count();
             for (std::uint32_t c = 0; c < from.child_count(); ++c)
-              to[c] = make_grain(group_.nodes[from.first_child + c]);
+              to[c] = make_grain(make_octree_node(from.first_child + c));
             break;
           case Below::kSamples:
             node.packed_counts = from.sample_count();

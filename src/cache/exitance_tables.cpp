@@ -45,21 +45,32 @@ double decay(const std::array<Profile, 3>& profiles) {
   return fastest;
 }
 
+// Mean free paths are of this many scene units.
+double length_of(const Medium& medium) {
+  return double{smallest_mean_free_path(medium)} / double{medium.scale};
+}
+
+Medium in_units(Medium medium, float unit) {
+  medium.scale /= unit;
+  return medium;
+}
+
 }  // namespace
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
     : group_(group),
-      spacing_(hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
-      kernel_(resolved_profiles(medium, spacing_)),
+      unit_(std::ldexp(1.0f, -std::ilogb(length_of(medium)))),
+      spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
+      kernel_(resolved_profiles(in_units(medium, unit_), spacing_)),
       promise_(promise),
       allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
   if (group.size() == 0) return;
-  const OctreeNode& root = group.nodes[0];
+  const OctreeNode root = make_octree_node(0);
   const Vec3 least = Vec3(root.centre[0], root.centre[1], root.centre[2]) - Vec3(root.radius),
              size(2 * root.radius);
   // Whole blocks around all samples, and no more than 2^20 cells an axis. Cells are for receivers, too, which
   // lie closer than a mean free path only where each of them has to be certain.
-  const double length = double{smallest_mean_free_path(medium)} / double{medium.scale};
+  const double length = double{unit_} * length_of(medium);
   cell_size_ = std::max({kCellSpacings * spacing_, promise == Promise::kCertified ? 0 : kCellLengths * length,
                          0x1p-20 * double{size.x}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
@@ -68,7 +79,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
     allowance_ *= std::clamp(double{root.radius} / (kManyLengths * length), kFewest, 1.0);
   // Hardly any less where that is a mean free path or more, a tenth at half of one.
   if (promise == Promise::kCalibrated)
-    own_share_ = 1 / (1 + 0.4 * std::pow(decay(make_profiles(medium)) * length, 6));
+    own_share_ = 1 / (1 + 0.4 * std::pow(decay(make_profiles(in_units(medium, unit_))) * length, 6));
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
@@ -103,13 +114,10 @@ void Exitance::make_tables() {
     return std::clamp(std::bit_cast<std::int32_t>(r2) >> all.shift, all.first, all.last);
   };
   const double largest = cell_size_ * (1 << kBlockLevels);
-  Box3 box;
-  for (const OctreeNode& node : group_.nodes.first(1))
-    box = Box3(Vec3(node.centre[0], node.centre[1], node.centre[2]) - Vec3(node.radius),
-               Vec3(node.centre[0], node.centre[1], node.centre[2]) + Vec3(node.radius));
+  const OctreeNode root = make_octree_node(0);
   // The first bin holds all that is nearer and is never accepted.
   bins_ = {bin_of(cell_size_ / 16), 0, all.shift};
-  bins_.last = std::max(bin_of(double{box.size().length()} + 4 * largest), bins_.first + 1);
+  bins_.last = std::max(bin_of(2 * std::sqrt(3.0) * double{root.radius} + 4 * largest), bins_.first + 1);
   const auto count = static_cast<std::size_t>(bins_.last - bins_.first + 1);
   constexpr std::size_t kVector = 64;  // floats in the longest vector there is
   const std::size_t padded = (count + kVector - 1) / kVector * kVector;
@@ -119,7 +127,6 @@ void Exitance::make_tables() {
   const bool certified = promise_ == Promise::kCertified;
   const double own = 0.5 * allowance_ * own_share_;
   const double weight = (certified ? 1 : kSeriesWeight) / 6;
-  const OctreeNode& root = group_.nodes[0];
 
   lean_.assign(padded, 0);
   bend_.assign(padded, 0);
@@ -173,13 +180,13 @@ std::uint64_t Exitance::cell_code(const Vec3& x) const noexcept {
   std::uint64_t code = 0;
   for (int axis = 0; axis < 3; ++axis)
     code |= spread_bits(static_cast<std::uint64_t>(std::clamp(
-                (static_cast<double>(x[axis]) - origin_[axis]) * cells_per_unit_, 0.0, 0x1p21 - 1)))
+                (static_cast<double>(unit_ * x[axis]) - origin_[axis]) * cells_per_unit_, 0.0, 0x1p21 - 1)))
             << axis;
   return code;
 }
 
 bool Exitance::in_grid(const Vec3& x) const noexcept {
-  const Vec3d offset = (Vec3d(x) - origin_) * cells_per_unit_;
+  const Vec3d offset = (Vec3d(unit_ * x) - origin_) * cells_per_unit_;
   return std::min({offset.x, offset.y, offset.z}) >= 0 && std::max({offset.x, offset.y, offset.z}) < 0x1p21;
 }
 

@@ -59,7 +59,7 @@ void Translucency::make_field(const CacheGroup& group, double tolerance) {
   if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
   const double distance = ExitanceField::node_distance(tolerance) * length;
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
-    field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance);
+    field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance, tolerance);
 }
 
 std::string Translucency::describe_path() const {

@@ -15,8 +15,8 @@ using namespace testing_support;
 
 // Samples on the square [-1,1]^2 and on the unit sphere, `paths` mean free paths apart: 0.65 as bake does it.
 struct Fixture {
-  explicit Fixture(const SurfaceSamples& samples, double tolerance = 0.01, double paths = 0.65)
-      : owned(make_group(samples)) {
+  explicit Fixture(const SurfaceSamples& samples, double with_tolerance = 0.01, double paths = 0.65)
+      : owned(make_group(samples)), tolerance(with_tolerance) {
     double area = 0;
     for (const float a : samples.areas) area += static_cast<double>(a);
     spacing = hexagonal_spacing(area, static_cast<double>(samples.size()));
@@ -27,6 +27,7 @@ struct Fixture {
     exact = std::make_unique<const Exitance>(owned.group, medium, 0);
   }
   OwnedGroup owned;
+  double tolerance;
   Medium medium;
   double spacing = 0, distance = 0;
   std::unique_ptr<const Exitance> exitance, exact;
@@ -53,7 +54,7 @@ std::vector<Hit> make_hits(const Mesh& mesh, std::size_t count) {
 }
 
 void expect_agreement(const Fixture& fixture, const Mesh& mesh, double tolerance, const char* name) {
-  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance, fixture.tolerance);
   const std::vector<Hit> hits = make_hits(mesh, 400);
   const std::vector<Rgb> values = eval(field, hits);
   double error[3]{}, norm[3]{}, brightest[3]{};
@@ -141,8 +142,12 @@ TEST(ExitanceField, HasNoCracks) {
   const Mesh whole = make_graded_square();
   Mesh middle = whole;
   for (Vec3& p : middle.positions) p *= 0.6f;
-  EXPECT_LT(largest_crack(ExitanceField({&middle}, *fixture.exitance, fixture.distance), middle), 2e-5);
-  EXPECT_LT(largest_crack(ExitanceField({&whole}, *fixture.exitance, fixture.distance), whole), 0.006);
+  EXPECT_LT(
+      largest_crack(ExitanceField({&middle}, *fixture.exitance, fixture.distance, fixture.tolerance), middle),
+      2e-5);
+  EXPECT_LT(
+      largest_crack(ExitanceField({&whole}, *fixture.exitance, fixture.distance, fixture.tolerance), whole),
+      0.006);
 }
 
 // Light on one sample alone: nodes are too far apart for that, and the patches around it are not
@@ -154,7 +159,7 @@ TEST(ExitanceField, ResolvesLightNarrowerThanItsNodes) {
     for (std::size_t i = 0; i < samples.size(); ++i)
       samples.irradiance[i] *= (samples.positions[i] - Vec3(x, 0.2f, 0)).length() < 0.02f ? 1.0f : 0.0f;
     const Fixture fixture(samples);
-    const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+    const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance, fixture.tolerance);
     Rng rng(1);
     double error = 0, norm = 0;
     for (int i = 0; i < 500; ++i) {
@@ -187,8 +192,9 @@ TEST(ExitanceField, DependsNeitherOnOrderNorOnThreads) {
   const Fixture fixture(make_plane(60, &side_light));
   const Mesh mesh = make_graded_square();
   const std::vector<Hit> hits = make_hits(mesh, 3000);
-  const std::vector<Rgb> once = eval(ExitanceField({&mesh}, *fixture.exitance, fixture.distance), hits);
-  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  const std::vector<Rgb> once =
+      eval(ExitanceField({&mesh}, *fixture.exitance, fixture.distance, fixture.tolerance), hits);
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance, fixture.tolerance);
   std::vector<Rgb> together(hits.size());
   parallel_for(hits.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -207,7 +213,7 @@ TEST(ExitanceField, EvaluatesEachNodeOnce) {
     for (Vec3& p : middle.positions) p *= 0.6f;
     return middle;
   }();
-  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance);
+  const ExitanceField field({&mesh}, *fixture.exitance, fixture.distance, fixture.tolerance);
   const std::vector<Hit> hits = make_hits(mesh, 5000);
   std::vector<Rgb> values(hits.size());
   std::uint64_t first = 0, second = 0;
@@ -223,7 +229,7 @@ TEST(ExitanceField, TakesOddMeshes) {
   Mesh mesh = make_rectangle();
   mesh.triangles.push_back({0, 0, 1});
   mesh.triangles.push_back({2, 2, 2});
-  const ExitanceField field({nullptr, &mesh}, *fixture.exitance, fixture.distance);
+  const ExitanceField field({nullptr, &mesh}, *fixture.exitance, fixture.distance, fixture.tolerance);
   for (std::uint32_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
     const Hit hit{.t = 1, .mesh = 1, .triangle = triangle, .u = 0.3f, .v = 0.3f};
     const Rgb value = eval(field, {&hit, 1})[0];

@@ -341,6 +341,30 @@ TEST_P(EveryKind, FarAwayIsDarkAndNeverNaN) {
     }
 }
 
+// A scene in other units is the same scene: by powers of two to the bit, at whatever length.
+TEST_P(EveryKind, UnitsDoNotMatter) {
+  const SurfaceSamples samples = make_sphere(48, &side_light);
+  const auto evaluate = [&](float unit) {
+    SurfaceSamples scaled = samples;
+    for (Vec3& p : scaled.positions) p *= unit;
+    for (float& area : scaled.areas) area *= unit * unit;
+    Medium medium = make_medium(*find_preset("Marble"));
+    medium.profile = GetParam();
+    medium.scale = 5 / unit;
+    const OwnedGroup owned = make_group(scaled);
+    std::vector<Vec3> points;
+    for (std::size_t i = 0; i < scaled.size(); i += 13) points.push_back(1.01f * scaled.positions[i]);
+    std::uint64_t evaluations = 0;
+    std::vector<Rgb> values = eval(Exitance(owned.group, medium, 0.01), points, evaluations);
+    const std::vector<Rgb> exact = eval(Exitance(owned.group, medium, 0), points, evaluations);
+    values.insert(values.end(), exact.begin(), exact.end());
+    return values;
+  };
+  const std::vector<Rgb> wanted = evaluate(1);
+  for (const float unit : {0x1p-24f, 0x1p-17f, 0x1p-8f, 0x1p10f, 0x1p24f})
+    EXPECT_TRUE(evaluate(unit) == wanted) << unit;
+}
+
 TEST_P(EveryKind, DarkAndEmptyGroupsGiveZero) {
   SurfaceSamples dark = make_sphere(16, [](const Vec3&, const Vec3&) { return Rgb(0, 0, 0); });
   const OwnedGroup owned = make_group(dark), empty = make_group({});

@@ -93,12 +93,16 @@ class Exitance {
   struct Moments;
   Grains find_grains() const;
   SumSource make_source(std::size_t sample) const noexcept;
+  OctreeNode make_octree_node(std::uint32_t index) const noexcept;
+  std::vector<Vec3> scaled(std::span<const Vec3> points) const;
   void copy_octree();
   void add_all_moments();
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                       std::span<const Moments> moments);
   void make_tables();
   bool in_grid(const Vec3& x) const noexcept;
+  void sum_exactly(std::span<const Vec3> scaled_points, std::span<Rgb> exitance,
+                   std::uint64_t& evaluations) const;
   void eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
                    bool whole) const;
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
@@ -107,6 +111,9 @@ class Exitance {
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
 
   const CacheGroup& group_;
+  // Power of two that makes scene units lengths of about a mean free path, in which all that follows is, so
+  // that nothing runs over or under, however long they are.
+  float unit_;
   LargeArray<SumSource> sources_;
   LargeArray<SumNode> nodes_;
   double spacing_;  // distance of samples

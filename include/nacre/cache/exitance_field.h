@@ -26,14 +26,13 @@ namespace nacre {
 class ExitanceField {
  public:
   /// Distance of nodes in smallest mean free paths for a tolerance of the sum, below which interpolation
-  /// stays: M_o has no detail below about one. Its error is 0.1 to 0.25 % at the distance for 0.6 % and more,
-  /// and falls at least with the square of that.
-  static double node_distance(double tolerance) noexcept {
-    return 1.9 * std::min(1.0, std::sqrt(tolerance / 0.006));
-  }
+  /// stays: M_o has no detail below about one. Its error is 0.1 to 0.25 % at the distance for 1 % and more,
+  /// up to 0.7 % in random scenes (tests/soak), and falls at least with the square of that.
+  static double node_distance(double tolerance) noexcept { return 1.9 * std::sqrt(strictness(tolerance)); }
 
-  /// `meshes` by the index that hits have (nullptr: of another medium); `distance` of nodes in scene units.
-  ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance);
+  /// `meshes` by the index that hits have (nullptr: of another medium); `distance` of nodes in scene units,
+  /// for that tolerance.
+  ExitanceField(std::vector<const Mesh*> meshes, const Exitance& exitance, double distance, double tolerance);
   /// Number of nodes that a field would have, about; fields for which that is more than kMostNodes are not
   /// worth their memory.
   static double predict_nodes(std::span<const Mesh* const> meshes, double distance);
@@ -74,6 +73,12 @@ class ExitanceField {
   struct Division;
   class Divider;
 
+  // What nodes may err by, as a share of what the widest do: less than in proportion, since the rest of the
+  // tolerance is the sum's.
+  static double strictness(double tolerance) noexcept {
+    return std::min(1.0, std::pow(tolerance / 0.01, 1.25));
+  }
+
   void divide_meshes(double distance);
   template <class Corners>
   void place_run(const Division& run, std::uint32_t vertices, std::span<const std::uint32_t> places,
@@ -93,6 +98,7 @@ class ExitanceField {
 
   const Exitance& exitance_;
   std::vector<const Mesh*> meshes_;
+  float most_bend_, most_change_;
   std::vector<std::uint32_t> first_triangle_;  // by mesh
   mutable LargeArray<Part> parts_;             // by triangle, then those of divided ones
   std::vector<Patch> patches_;

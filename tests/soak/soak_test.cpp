@@ -1,0 +1,26 @@
+// label: image
+// A few random scenes; tools/soak.sh goes on for as long as one likes.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "soak/trial.h"
+
+namespace nacre::soak {
+namespace {
+
+TEST(Soak, RandomScenesHoldWhatIsPromised) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "nacre-soak-test";
+  int rendered = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    std::filesystem::create_directories(folder);
+    const Trial trial = run_trial(seed, folder.string());
+    EXPECT_EQ(trial.violation, "") << "seed " << seed << ": " << trial.options;
+    rendered += trial.refusal.empty();
+    std::filesystem::remove_all(folder);
+  }
+  EXPECT_GE(rendered, 8);
+}
+
+}  // namespace
+}  // namespace nacre::soak
