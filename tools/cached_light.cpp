@@ -70,14 +70,15 @@ std::vector<LightScale> scale_planes(const CacheGroup& group, const Scene& scene
 
 }  // namespace
 
-std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments) {
+std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments,
+                                   const std::string& place) {
   std::vector<Rgb> scales(scene.lights.size(), Rgb(1, 1, 1));
   for (const std::string& argument : arguments) {
     const std::size_t equals = argument.rfind('=');
     const std::optional<Rgb> scale =
         equals == std::string::npos ? std::nullopt : parse_scale(argument.substr(equals + 1));
     if (!scale)
-      throw UsageError("--light " + argument + ": write it as ID=SCALE or ID=r,g,b, numbers from 0 to 1e9");
+      throw UsageError(place + " " + argument + ": write it as ID=SCALE or ID=r,g,b, numbers from 0 to 1e9");
     const std::string id = argument.substr(0, equals);
     bool found = false;
     for (std::size_t i = 0; i < scales.size(); ++i)
@@ -86,7 +87,7 @@ std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::st
         found = true;
       }
     if (!found || id.empty())
-      fail(ErrorCode::kValue, "--light", "no light has the id '{}'; there is {}", id, names_of_lights(scene));
+      fail(ErrorCode::kValue, place, "no light has the id '{}'; there is {}", id, names_of_lights(scene));
   }
   return scales;
 }

@@ -12,7 +12,8 @@ namespace nacre::tools {
 
 /// What the arguments of --light ("ID=SCALE", "ID=r,g,b"; the id of a light or of a group) come to, for each
 /// light of the scene. Throws UsageError for what cannot be read, Error(kValue) for an id that no light has.
-std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments);
+std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::string>& arguments,
+                                   const std::string& place = "--light");
 
 /// Multiplies what the lights send.
 void scale_lights(Scene& scene, const std::vector<Rgb>& scales);

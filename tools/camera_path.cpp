@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "json_file.h"
 #include "nacre/base/file.h"
 
 namespace nacre::tools {
@@ -14,11 +15,11 @@ constexpr std::size_t kMostBytes = std::size_t{16} << 20, kMostKeys = 10'000;
 constexpr double kLargest = 1e12;  // of a coordinate
 
 // What stands there instead of what was wanted.
-std::string excerpt(const nlohmann::json& value) {
+std::string excerpt(const nlohmann::ordered_json& value) {
   return value.is_primitive() ? value.dump() : std::string(value.type_name());
 }
 
-Vec3d read_triple(const nlohmann::json& value, const std::string& name, const std::string& place) {
+Vec3d read_triple(const nlohmann::ordered_json& value, const std::string& name, const std::string& place) {
   Vec3d triple;
   bool sound = value.is_array() && value.size() == 3;
   for (std::size_t k = 0; sound && k < 3; ++k) {
@@ -32,7 +33,7 @@ Vec3d read_triple(const nlohmann::json& value, const std::string& name, const st
   return triple;
 }
 
-CameraKey read_key(const nlohmann::json& entry, const std::string& place) {
+CameraKey read_key(const nlohmann::ordered_json& entry, const std::string& place) {
   if (!entry.is_object())
     fail(ErrorCode::kSyntax, place,
          "is no key frame: {{\"frame\": 1, \"origin\": [0, 20, 100], \"target\": [0, 20, 0]}}");
@@ -68,24 +69,13 @@ CameraKey read_key(const nlohmann::json& entry, const std::string& place) {
 }  // namespace
 
 std::vector<CameraKey> load_camera_path(const std::string& path) {
-  const std::string text = read_text_file(path, kMostBytes);
-  nlohmann::json json;
-  try {
-    json = nlohmann::json::parse(text);
-  } catch (const nlohmann::json::parse_error& error) {
-    const auto line =
-        1 + std::count(text.begin(),
-                       text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, text.size())), '\n');
-    fail(ErrorCode::kSyntax, fmt::format("{}:{}", path, line), "is not JSON from here on");
-  } catch (const nlohmann::json::out_of_range&) {
-    fail(ErrorCode::kValue, path, "holds a number that is too large");
-  }
+  const nlohmann::ordered_json json = load_json(path, kMostBytes);
   if (!json.is_array() || json.empty())
     fail(ErrorCode::kSyntax, path, "is no list of key frames: [{{\"frame\": 1, \"origin\": ...}}, ...]");
   if (json.size() > kMostKeys)
     fail(ErrorCode::kLimit, path, "has {} key frames; at most {} will do", json.size(), kMostKeys);
   std::vector<CameraKey> keys;
-  for (const nlohmann::json& entry : json) {
+  for (const nlohmann::ordered_json& entry : json) {
     const std::string place = fmt::format("{}: key frame {}", path, keys.size() + 1);
     keys.push_back(read_key(entry, place));
     if (keys.size() > 1 && keys.back().frame <= keys[keys.size() - 2].frame)

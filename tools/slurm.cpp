@@ -42,7 +42,13 @@ std::string find_job_id(const std::string& output) {
 }  // namespace
 
 void require_slurm() {
-  if (run_command({"sbatch", "--version"}).exit_code != 0)
+  constexpr int kNotThere = 127;
+  const CommandResult result = run_command({"sbatch", "--version"});
+  if (result.exit_code != 0 && result.exit_code != kNotThere)
+    fail(ErrorCode::kIo, "--engine slurm",
+         "sbatch does not work here: {}; is this machine part of a cluster?",
+         result.output.substr(0, result.output.find('\n')));
+  if (result.exit_code == kNotThere)
     fail(ErrorCode::kNotFound, "--engine slurm",
          "there is no sbatch in the PATH; run this where Slurm jobs are submitted, or give each machine a "
          "--shard");

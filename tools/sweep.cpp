@@ -83,11 +83,12 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   std::ranges::stable_sort(of_medium, {}, [](const Setting& s) { return setting_order(s.key); });
   const std::string place =
       (options.plan.empty() ? "--vary" : options.plan) + std::string(": point ") + std::to_string(index + 1);
+  check_settings(of_medium, place);
   for (const Setting& setting : of_medium) apply_setting(point.material, setting, place);
   if (!of_medium.empty() && max_channel(point.material.sigma_s + point.material.sigma_a) == 0)
     fail(ErrorCode::kValue, place, "the medium neither scatters nor absorbs");
   if (!point.camera.empty()) find_camera(scene, point.camera, place);
-  find_light_scales(scene, point.lights);
+  find_light_scales(scene, point.lights, place);
   return point;
 }
 
@@ -262,6 +263,12 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
   write("index.html", make_sweep_page(plan, pictures, options.scene.path));
   write("manifest.json", manifest.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
   session.progress().say(options.output + "/manifest.json, contact_sheet.png and index.html");
+  std::size_t end = points.size();
+  while (std::filesystem::exists(options.output + "/" + picture_name(end) + ".exr")) ++end;
+  if (end > points.size())
+    session.warn(
+        {fmt::format("{}: pictures {} to {} are of an earlier sweep, the manifest does not name them",
+                     options.output, picture_name(points.size()), picture_name(end - 1))});
 }
 
 std::vector<std::string> keys_of(const std::vector<Point>& points) {
@@ -312,6 +319,9 @@ void run(const Options& options, const CLI::App& command, const std::string& com
       ++own;
       if (!find_complete(options.output, point.index, point.key)) pending.push_back(&point);
     }
+  if (own == 0)
+    session.progress().say(
+        fmt::format("--shard {}: nothing to do, there are {} pictures", options.shard, points.size()));
   session.progress().say(fmt::format(
       "{} of {} pictures to render{}", pending.size(), points.size(),
       own > pending.size() ? fmt::format(", {} are there", own - pending.size()) : std::string()));

@@ -1,12 +1,14 @@
 // Reading what a sweep varies.
 #include "sweep_plan.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "common.h"
+#include "json_file.h"
 #include "nacre/base/error.h"
 #include "nacre/base/file.h"
 
@@ -81,6 +83,8 @@ SweepAxis parse_axis(const std::string& text) {
   if (range.size() == 1 || pattern.key == "material" || pattern.key == "camera") {
     for (const std::string& value : split(values, ';')) {
       if (trimmed(value).empty()) wrong("an empty value");
+      for (const Setting& other : axis.values)
+        if (other.value == trimmed(value)) wrong(trimmed(value) + " is given twice");
       axis.values.push_back(make_setting(axis.name, trimmed(value)));
     }
     return axis;
@@ -93,6 +97,7 @@ SweepAxis parse_axis(const std::string& text) {
     wrong("A, B and COUNT are numbers, COUNT at least 1");
   if (logarithmic && !(*first > 0 && *last > 0)) wrong("a logarithmic range is above 0");
   check_points(static_cast<std::size_t>(*count));
+  if (*first == *last && *count > 1) wrong("A and B are the same");
   for (int i = 0; i < *count; ++i) {
     const double at = *count == 1 ? 0 : static_cast<double>(i) / (*count - 1);
     const double value = logarithmic ? *first * std::pow(*last / *first, at) : *first + (*last - *first) * at;
@@ -136,27 +141,33 @@ SweepPlan make_plan(const std::vector<std::string>& axes, bool together) {
 
 SweepPlan load_plan(const std::string& path) {
   constexpr std::size_t kMostBytes = std::size_t{64} << 20;
-  const std::string text = read_text_file(path, kMostBytes);
   SweepPlan plan;
   const auto add = [&](std::vector<Setting>& point, const std::string& key, const std::string& value,
                        const std::string& place) {
     const Setting setting = make_setting(key, value);
     if (!is_key(setting.key) || (setting.relative && !can_multiply(setting.key)))
       fail(ErrorCode::kValue, place, "'{}' is none of {}", key, kKeys);
+    for (const Setting& other : point)
+      if (other.key == setting.key) fail(ErrorCode::kValue, place, "{} is given twice", setting.key);
     point.push_back(setting);
   };
   if (path.ends_with(".json")) {
-    const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
-    if (json.is_discarded() || !json.is_array())
+    const nlohmann::ordered_json json = load_json(path, kMostBytes);
+    if (!json.is_array())
       fail(ErrorCode::kSyntax, path, "is no list of points: [{{\"sigma_a\": 0.1, \"g\": \"0,0,0\"}}, ...]");
     for (const auto& entry : json) {
       const std::string place = fmt::format("{}: point {}", path, plan.points.size() + 1);
       if (!entry.is_object() || entry.empty()) fail(ErrorCode::kSyntax, place, "is no object with keys");
       std::vector<Setting>& point = plan.points.emplace_back();
       for (const auto& [key, value] : entry.items()) {
-        if (!value.is_string() && !value.is_number())
-          fail(ErrorCode::kSyntax, place, "{} is neither a number nor a text", key);
-        add(point, key, value.is_string() ? value.get<std::string>() : value.dump(), place);
+        const bool triple = value.is_array() && value.size() == 3 &&
+                            std::ranges::all_of(value, [](const auto& v) { return v.is_number(); });
+        if (!value.is_string() && !value.is_number() && !triple)
+          fail(ErrorCode::kSyntax, place, "{} is neither a number, nor a text, nor [r, g, b]", key);
+        const std::string text =
+            triple ? fmt::format("{},{},{}", value[0].dump(), value[1].dump(), value[2].dump())
+                   : value.dump();
+        add(point, key, value.is_string() ? value.get<std::string>() : text, place);
       }
     }
   } else if (path.ends_with(".csv")) {
@@ -175,6 +186,8 @@ SweepPlan load_plan(const std::string& path) {
       for (std::string& cell : cells) cell = trimmed(cell);
       return cells;
     };
+    std::string text = read_text_file(path, kMostBytes);
+    if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);  // a mark that spreadsheets put there
     std::vector<std::string> keys;
     int number = 0;
     for (const std::string& line : split(text, '\n')) {
@@ -184,6 +197,8 @@ SweepPlan load_plan(const std::string& path) {
       const std::string place = fmt::format("{}:{}", path, number);
       if (keys.empty()) {
         keys = cells;
+        std::vector<Setting> checked;
+        for (const std::string& key : keys) add(checked, key, "", place);
         continue;
       }
       if (cells.size() != keys.size())

@@ -50,6 +50,17 @@ int setting_order(const std::string& key) {
 
 bool is_medium_key(const std::string& key) { return setting_order(key) < static_cast<int>(kKeys.size()); }
 
+void check_settings(std::span<const Setting> settings, const std::string& place) {
+  for (const Setting& one : settings)
+    for (const Setting& both : settings)
+      if (!one.relative && (one.key == "sigma_a" || one.key == "sigma_s_prime") &&
+          (both.key == "mfp" || both.key == "albedo"))
+        fail(ErrorCode::kValue, place,
+             "{0} sets sigma_a and sigma_s_prime, so {1}={2} would not hold; leave out one, or write "
+             "{1}*=FACTOR",
+             both.key, one.key, one.value);
+}
+
 void apply_setting(Medium& medium, const Setting& setting, const std::string& place) {
   const std::string& key = setting.key;
   const auto value = [&](const Rgb& old) {

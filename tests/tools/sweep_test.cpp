@@ -172,6 +172,17 @@ TEST_F(Sweep, SaysThatThereIsNoSlurm) {
   ::setenv("PATH", path.c_str(), 1);
 }
 
+// As spreadsheets save them, and lists in JSON.
+TEST_F(Sweep, ReadsPlansOfEitherKind) {
+  folder_.write("p.csv", "\xef\xbb\xbfmfp,g\r\n\"0.5,1,2\",0.1\r\n");
+  folder_.write("p.json", "\xef\xbb\xbf[{\"mfp\": [0.5, 1, 2], \"g\": 0.1}]");
+  for (const char* const plan : {"p.csv", "p.json"}) {
+    run(std::string("sweep s.xml --cache c.nacre --size 16x12 --spp 1 -o x --plan ") + plan);
+    EXPECT_EQ(manifest("x")["pictures"][0]["settings"]["mfp"], "0.5,1,2");
+    EXPECT_EQ(manifest("x")["pictures"][0]["settings"]["g"], "0.1");
+  }
+}
+
 TEST_F(Sweep, RefusesWhatItCannotVary) {
   expect_refusal("", 2, "--vary");
   expect_refusal("--vary sigma_a", 2, "no =");
@@ -186,10 +197,24 @@ TEST_F(Sweep, RefusesWhatItCannotVary) {
   expect_refusal("--vary sigma_a=0 --vary sigma_s_prime=0", 1, "neither scatters nor absorbs");
   expect_refusal("--vary albedo=0.5:1.5:2", 1, "outside");
   expect_refusal("--vary camera=top", 1, "front");
+  expect_refusal("--vary sigma_a=0.1 --vary mfp=1:2:2", 1, "sigma_a=0.1 would not hold");
+  expect_refusal("--vary albedo=0.1 --vary sigma_s_prime=1", 1, "sigma_s_prime=1 would not hold");
+  expect_refusal("--vary 'g=0.1;0.2;0.1'", 2, "0.1 is given twice");
+  expect_refusal("--vary g=0.1:0.1:2", 2, "A and B are the same");
   expect_refusal("--vary light.moon=1", 1, "moon");
   expect_refusal("--vary sigma_a=1:2:2 --medium glass", 1, "glass");
   folder_.write("p.csv", "sigma_a,g\n1\n");
   expect_refusal("--plan p.csv", 1, "p.csv:2");
+  folder_.write("p.csv", "material,g,material\nMarble,1,Skin1\n");
+  expect_refusal("--plan p.csv", 1, "p.csv:1: material is given twice");
+  folder_.write("p.csv", "colour\n1\n");
+  expect_refusal("--plan p.csv", 1, "p.csv:1: 'colour' is none of");
+  folder_.write("p.json", "[{\"g\": 0.1,\n \"g\": 0.2}]");
+  expect_refusal("--plan p.json", 1, "p.json: has \"g\" twice");
+  folder_.write("p.json", "[{\"g\":\n 1e400}]");
+  expect_refusal("--plan p.json", 1, "too large");
+  folder_.write("p.json", "[{\"mfp\": [1, 2]}]");
+  expect_refusal("--plan p.json", 1, "nor [r, g, b]");
   EXPECT_FALSE(std::filesystem::exists(folder_.file("x")));
 }
 

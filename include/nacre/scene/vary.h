@@ -1,6 +1,7 @@
 // Changing one thing of a scene by name, as sweeps do.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "nacre/optics/medium.h"
@@ -25,6 +26,10 @@ bool is_medium_key(const std::string& key);
 /// Throws Error(kValue, place) for a name that is none, a number that is out of range, and what is not
 /// the medium's.
 void apply_setting(Medium& medium, const Setting& setting, const std::string& place);
+
+/// Throws Error(kValue, place) for settings of one medium that would undo each other: mfp and albedo set both
+/// coefficients anew, so neither goes with a value (though with a factor) for one of them.
+void check_settings(std::span<const Setting> settings, const std::string& place);
 
 /// The rank of a key among those of media, for sorting.
 int setting_order(const std::string& key);
