@@ -15,9 +15,9 @@ struct XmlElement {
   std::string tag;  // "lookAt" of older files is "lookat" here
   std::string file;
   std::size_t line = 0;
-  std::string sandbox;  // folder that files named here have to lie in; "": anywhere
   std::vector<std::pair<std::string, std::string>> attributes;
   std::vector<XmlElement> children;
+  std::string sandbox;  // folder that files named here have to lie in; "": anywhere
 
   /// "file:line"
   std::string place() const { return fmt::format("{}:{}", file, line); }

@@ -147,25 +147,57 @@ TEST_F(CacheFile, GoldenBadFilesAreRefused) {
   }
 }
 
+std::vector<Bytes> every_version() {
+  return {read_bytes(kGolden + "good-v1.nacre"), read_bytes(kGolden + "good-v2.nacre")};
+}
+
 TEST_F(CacheFile, EveryFlippedBitOfHeaderAndTableIsRefused) {
-  const Bytes bytes = good();
-  const std::size_t end = sizeof(layout::Header) + count_sections(bytes) * sizeof(layout::SectionEntry);
-  for (std::size_t i = 0; i < end; ++i) {
-    Bytes flipped = bytes;
-    flipped[i] ^= static_cast<unsigned char>(1u << (i % 8));
-    EXPECT_EQ(error_of(flipped).code(), i < 8 ? ErrorCode::kNotACache : ErrorCode::kDamaged) << i;
+  for (const Bytes& bytes : every_version()) {
+    const std::size_t end = sizeof(layout::Header) + count_sections(bytes) * sizeof(layout::SectionEntry);
+    for (std::size_t i = 0; i < end; ++i) {
+      Bytes flipped = bytes;
+      flipped[i] ^= static_cast<unsigned char>(1u << (i % 8));
+      EXPECT_EQ(error_of(flipped).code(), i < 8 ? ErrorCode::kNotACache : ErrorCode::kDamaged) << i;
+    }
   }
 }
 
 TEST_F(CacheFile, FlippedBytesAreFoundInTheirSection) {
-  const Bytes bytes = good();
-  for (std::size_t i = 0; i < count_sections(bytes); ++i) {
-    const auto entry = entry_at(bytes, i);
-    for (std::uint64_t at = 0; at < entry.size; at += 3) {
-      Bytes flipped = bytes;
-      flipped[entry.offset + at] ^= 0x10;
-      expect_damaged(flipped, std::string(entry.kind.data(), 4), entry.group, fmt::format("byte {}", at));
+  for (const Bytes& bytes : every_version())
+    for (std::size_t i = 0; i < count_sections(bytes); ++i) {
+      const auto entry = entry_at(bytes, i);
+      for (std::uint64_t at = 0; at < entry.size; at += 3) {
+        Bytes flipped = bytes;
+        flipped[entry.offset + at] ^= 0x10;
+        expect_damaged(flipped, std::string(entry.kind.data(), 4), entry.group, fmt::format("byte {}", at));
+      }
     }
+}
+
+// Two sections that have changed places, or their entries in the table.
+TEST_F(CacheFile, SwappedSectionsAreRefused) {
+  for (const Bytes& bytes : every_version()) {
+    const std::size_t sections = count_sections(bytes);
+    int contents = 0;
+    for (std::size_t i = 0; i < sections; ++i)
+      for (std::size_t k = 0; k < i; ++k) {
+        const auto one = entry_at(bytes, i), other = entry_at(bytes, k);
+        const auto table = [](std::size_t entry) {
+          return static_cast<std::ptrdiff_t>(sizeof(layout::Header) + entry * sizeof(layout::SectionEntry));
+        };
+        Bytes swapped = bytes;
+        std::swap_ranges(swapped.begin() + table(i), swapped.begin() + table(i + 1),
+                         swapped.begin() + table(k));
+        EXPECT_EQ(error_of(swapped).code(), ErrorCode::kDamaged);
+        swapped = bytes;
+        if (one.size != other.size || one.checksum == other.checksum) continue;
+        std::swap_ranges(swapped.begin() + static_cast<std::ptrdiff_t>(one.offset),
+                         swapped.begin() + static_cast<std::ptrdiff_t>(one.offset + one.size),
+                         swapped.begin() + static_cast<std::ptrdiff_t>(other.offset));
+        EXPECT_EQ(error_of(swapped).code(), ErrorCode::kDamaged);
+        ++contents;
+      }
+    EXPECT_GE(contents, 20);
   }
 }
 
@@ -179,11 +211,11 @@ TEST_F(CacheFile, PaddingDoesNotMatter) {
 }
 
 TEST_F(CacheFile, TruncationAtAnyLengthIsTruncation) {
-  const Bytes bytes = good();
-  for (std::size_t size = 0; size < bytes.size(); ++size) {
-    const Error error = error_of(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)));
-    EXPECT_EQ(error.code(), size < 8 ? ErrorCode::kNotACache : ErrorCode::kTruncated) << size;
-  }
+  for (const Bytes& bytes : every_version())
+    for (std::size_t size = 0; size < bytes.size(); size += size < 512 ? 1 : 7) {
+      const Error error = error_of(Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)));
+      EXPECT_EQ(error.code(), size < 8 ? ErrorCode::kNotACache : ErrorCode::kTruncated) << size;
+    }
 }
 
 TEST_F(CacheFile, WhatFollowsTheEndIsRefused) {

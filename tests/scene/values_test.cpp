@@ -10,7 +10,7 @@ namespace {
 
 XmlElement element(const std::string& tag, std::vector<std::pair<std::string, std::string>> attributes,
                    std::vector<XmlElement> children = {}) {
-  return {tag, "test.xml", 1, std::move(attributes), std::move(children)};
+  return {tag, "test.xml", 1, std::move(attributes), std::move(children), ""};
 }
 
 Rgb color(const std::string& tag, const std::string& value) {
