@@ -4,15 +4,19 @@ set -euo pipefail
 
 usage() {
   cat <<'END'
-usage: tools/test.sh [CTEST OPTION ...]
+usage: tools/test.sh [--sanitize] [CTEST OPTION ...]
 
 Installs what is missing, fetches the meshes, builds build/release and runs the tests. Options are handed to
 ctest: `-L unit` runs the tests of one label (unit, analytic, golden, image, cli), `-R NAME` those of a name.
+--sanitize runs them all in builds with AddressSanitizer and UndefinedBehaviorSanitizer, and those of what runs in
+threads in one with ThreadSanitizer: an hour or two on two cores.
 END
 }
 
+presets=(release)
 case "${1:-}" in
   -h | --help) usage; exit 0 ;;
+  --sanitize) presets=(sanitize sanitize-threads); shift ;;
 esac
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
@@ -25,6 +29,8 @@ if ((status == 3)); then
 elif ((status != 0)); then
   exit "$status"
 fi
-cmake --preset release
-cmake --build --preset release
-ctest --preset release --parallel "$(nproc)" "$@"
+for preset in "${presets[@]}"; do
+  cmake --preset "$preset"
+  cmake --build --preset "$preset"
+  ctest --preset "$preset" --parallel "$(nproc)" "$@"
+done

@@ -59,7 +59,7 @@ Medium in_units(Medium medium, float unit) {
 
 Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
     : group_(group),
-      unit_(std::ldexp(1.0f, -std::ilogb(length_of(medium)))),
+      unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(length_of(medium)), -100, 100))),
       spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
       kernel_(resolved_profiles(in_units(medium, unit_), spacing_)),
       promise_(promise),
