@@ -1,7 +1,9 @@
 // A picture: pixels in parallel, times and counts.
 #include "nacre/render/render.h"
 
+#include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include "nacre/base/parallel.h"
 #include "nacre/base/random.h"
@@ -190,7 +192,12 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
     return image;
   };
   const ImageDifference difference = compare_images(as_image(values), as_image(exact), "");
-  return {hits.size(), difference.relative_rmse, difference.largest_relative};
+  double anywhere = 0;
+  for (std::size_t i = 0; i < hits.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      if (const double sum = double{exact[i][k]}; sum >= double{std::numeric_limits<float>::min()})
+        anywhere = std::max(anywhere, std::abs(double{values[i][k]} / sum - 1));
+  return {hits.size(), difference.relative_rmse, difference.largest_relative, anywhere};
 }
 
 }  // namespace nacre

@@ -73,8 +73,10 @@ struct Totals {
           w.share, 100 * w.largest);
     const std::size_t n = memory.size();
     if (n >= 4)
-      fmt::print("memory: median of the second quarter {:.0f} MB, of the last {:.0f} MB\n",
-                 median_memory(n / 4, n / 2), median_memory(3 * n / 4, n));
+      fmt::print(
+          "memory: {:.0f} MB after the first scene, {:.0f} after the last; median of the second quarter "
+          "{:.0f} MB, of the last {:.0f} MB\n",
+          memory.front(), memory.back(), median_memory(n / 4, n / 2), median_memory(3 * n / 4, n));
   }
 };
 

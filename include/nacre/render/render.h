@@ -59,6 +59,7 @@ class Translucency;
 struct Verification {
   std::size_t points = 0;  // on translucent surfaces
   double relative_rmse = 0, largest = 0;
+  double largest_anywhere = 0;  // of every channel however dark, which is what a certified tolerance bounds
 };
 
 /// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is
