@@ -98,19 +98,19 @@ class LocalGrid {
   bool is_near_side(const Point& point) const {
     const Vec3 at = (point.position - corner_) * inverse_;
     constexpr float kWider = kMargin + 0.01f;
-    bool inside = true;
+    int inside = 1;
     for (int axis = 0; axis < 3; ++axis)
-      inside &= (at[axis] > kWider) & (at[axis] < static_cast<float>(kBlockCells) - kWider);
-    return !inside;
+      inside &= int{at[axis] > kWider} & int{at[axis] < static_cast<float>(kBlockCells) - kWider};
+    return inside == 0;
   }
   /// Adds a point of the block or of a neighbour, unless it is too far away to matter.
   void add(const Point& point) {
     const Vec3 at = (point.position - corner_) * inverse_;
     // Without a branch for each: which of them decides is anyone's guess.
-    bool within = true;
+    int within = 1;
     for (int axis = 0; axis < 3; ++axis)
-      within &= (at[axis] > -kMargin) & (at[axis] < static_cast<float>(kBlockCells) + kMargin);
-    if (!within) return;
+      within &= int{at[axis] > -kMargin} & int{at[axis] < static_cast<float>(kBlockCells) + kMargin};
+    if (within == 0) return;
     const auto cell = [](float x) { return static_cast<int>(x + 1) - 1; };
     insert(point, index(cell(at.x), cell(at.y), cell(at.z)));
   }
@@ -184,7 +184,7 @@ class LocalGrid {
   std::span<const Vec3> normals_;  // of all triangles
   float inverse_, radius2_;
   Vec3 corner_;
-  std::array<int, kSide * kSide * kSide> first_;
+  std::array<int, std::size_t{kSide} * kSide * kSide> first_;
   std::vector<Slots> slots_;
 };
 

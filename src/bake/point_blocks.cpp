@@ -49,11 +49,11 @@ void PointBlocks::gather(const BlockAt& block, BlockNeighbourhood& near) const {
   SpaceBlocks::for_each_around(block, [&](const BlockAt& neighbour) {
     for_each_in_bucket(blocks_.bucket(neighbour), [&](std::uint32_t i, const Vec3& position) {
       const Vec3 at = (position - near.box_.min) * near.inverse_;
-      bool within = true;
+      int within = 1;
       for (int axis = 0; axis < 3; ++axis)
-        within &= (at[axis] > -1 - kRounding) & (at[axis] < side + 1 + kRounding);
+        within &= int{at[axis] > -1 - kRounding} & int{at[axis] < side + 1 + kRounding};
       // A bucket may hold other blocks than this one.
-      if (!within || blocks_.at(position) != neighbour) return;
+      if (within == 0 || blocks_.at(position) != neighbour) return;
       const bool own = neighbour == block;
       if (own) near.own_.push_back(i);
       std::array<int, 3> c;

@@ -257,6 +257,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;
+  positions.reserve(steep.size());
   for (const std::uint32_t i : steep) positions.push_back(hit_position(*meshes_[hits[i].mesh], hits[i]));
   std::vector<Rgb> values(steep.size());
   exitance_.eval(positions, values, evaluations);

@@ -115,6 +115,7 @@ void extend_exitance(const std::string& path, std::vector<KeptExitance> exitance
     if (!more) return;
   }
   std::vector<std::string> keys;
+  keys.reserve(exitance.size());
   for (const KeptExitance& own : exitance) keys.push_back(layout::encode_texts(own.key));
   std::vector<layout::Section> sections;
   for (std::size_t g = 0; g < exitance.size(); ++g) {

@@ -118,7 +118,7 @@ void Exitance::make_tables() {
   // The first bin holds all that is nearer and is never accepted.
   bins_ = {bin_of(cell_size_ / 16), 0, all.shift};
   bins_.last = std::max(bin_of(2 * std::sqrt(3.0) * double{root.radius} + 4 * largest), bins_.first + 1);
-  const auto count = static_cast<std::size_t>(bins_.last - bins_.first + 1);
+  const auto count = static_cast<std::size_t>(bins_.last - bins_.first) + 1;
   constexpr std::size_t kVector = 64;  // floats in the longest vector there is
   const std::size_t padded = (count + kVector - 1) / kVector * kVector;
   const auto edge2 = [&](std::size_t bin) {

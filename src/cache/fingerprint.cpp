@@ -75,8 +75,8 @@ std::string text(const DielectricSurface& surface) {
                      text(surface.specular_transmittance), surface.int_ior, surface.ext_ior);
 }
 std::string text(const PlasticSurface& surface) {
-  const std::string plastic = fmt::format("plastic {} {} {} {}", text(surface.diffuse_reflectance),
-                                          surface.int_ior, surface.ext_ior, surface.nonlinear);
+  std::string plastic = fmt::format("plastic {} {} {} {}", text(surface.diffuse_reflectance), surface.int_ior,
+                                    surface.ext_ior, surface.nonlinear);
   if (surface.roughness.u == 0 && surface.roughness.v == 0) return plastic;
   return "rough" + plastic + " " + text(surface.specular_reflectance, surface.roughness);
 }

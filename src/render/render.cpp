@@ -174,6 +174,7 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
     if (!hit || world_.shape(hit).medium == kNone) continue;
     if (!world_.scene->media[static_cast<std::size_t>(world_.shape(hit).medium)].lambert) hits.push_back(hit);
   }
+  if (hits.empty()) return {};
   std::vector<Rgb> values(hits.size()), exact(hits.size());
   parallel_for(hits.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)

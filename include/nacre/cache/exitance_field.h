@@ -27,7 +27,7 @@ class ExitanceField {
  public:
   /// Distance of nodes in smallest mean free paths for a tolerance of the sum, below which interpolation
   /// stays: M_o has no detail below about one. Its error is 0.1 to 0.25 % at the distance for 1 % and more,
-  /// up to 0.7 % in random scenes (tests/soak), and falls at least with the square of that.
+  /// up to 0.9 % in random scenes (tests/soak), and falls at least with the square of that.
   static double node_distance(double tolerance) noexcept { return 1.9 * std::sqrt(strictness(tolerance)); }
 
   /// `meshes` by the index that hits have (nullptr: of another medium); `distance` of nodes in scene units,
@@ -76,7 +76,7 @@ class ExitanceField {
   // What nodes may err by, as a share of what the widest do: less than in proportion, since the rest of the
   // tolerance is the sum's.
   static double strictness(double tolerance) noexcept {
-    return std::min(1.0, std::pow(tolerance / 0.01, 1.25));
+    return std::min(1.0, std::pow(tolerance / 0.01, 1.7));
   }
 
   void divide_meshes(double distance);
