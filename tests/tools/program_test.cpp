@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "nacre/base/simd.h"
 #include "nacre/render/image_file.h"
 #include "tools/cli.h"
 
@@ -192,6 +193,23 @@ TEST_F(Program, ThreadsDoNotMatter) {
   run("render s.xml --cache c1.nacre -o a.exr --threads 1");
   run("render s.xml --cache c2.nacre -o b.exr --threads 2");
   expect_identical("a.exr", "b.exr");
+}
+
+// Sums are rounded differently by instructions that multiply and add at once, and a node more or less may be
+// taken as one; nothing else is.
+TEST_F(Program, VectorInstructionsMatterToRoundingAlone) {
+  run("bake s.xml -o c.nacre --irradiance-samples 2 --simd scalar");
+  run("render s.xml --cache c.nacre -o scalar.exr --spp 1 --simd scalar");
+  for (const std::string& target : simd_targets()) {
+    run("bake s.xml -o other.nacre --irradiance-samples 2 --simd " + target);
+    EXPECT_TRUE(read_file(folder_.file("c.nacre")) == read_file(folder_.file("other.nacre"))) << target;
+    run("render s.xml --cache c.nacre -o other.exr --spp 1 --simd " + target);
+    for (const char* const layer : {"single", "specular", "surface"})
+      EXPECT_NE(run(std::string("diff other.exr scalar.exr --layer ") + layer).find("identical"),
+                std::string::npos)
+          << target << " " << layer;
+    run("diff other.exr scalar.exr --layer diffusion --fail-above 0.00005");
+  }
 }
 
 TEST_F(Program, ACropIsAPartOfTheWhole) {
