@@ -23,10 +23,19 @@ Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
 // How many hits ahead memory is fetched.
 constexpr std::size_t kAhead = 32;
 
+// What is known of a part may be changed by others meanwhile, its kind may not.
+template <class Part>
+std::uint32_t load_mark(const Part& part, std::memory_order order) noexcept {
+  return std::atomic_ref(const_cast<std::uint32_t&>(part.mark)).load(order);
+}
+template <class Part>
+bool is_kind(const Part& part, std::uint32_t kind) noexcept {
+  return (load_mark(part, std::memory_order_relaxed) & kind) != 0;
+}
 // Values at the nodes of a part that is known may be read.
 template <class Part>
-std::uint32_t mark_of(Part& part) noexcept {
-  return std::atomic_ref(part.mark).load(std::memory_order_acquire);
+std::uint32_t mark_of(const Part& part) noexcept {
+  return load_mark(part, std::memory_order_acquire);
 }
 
 // Filters out most of what was asked for before.
@@ -49,18 +58,18 @@ std::uint32_t ExitanceField::find_patch(const Hit& hit, float& u, float& v) cons
   u = hit.u;
   v = hit.v;
   std::uint32_t index = first_triangle_[hit.mesh] + hit.triangle;
-  while (parts_[index].mark & kDivided)
+  while (is_kind(parts_[index], kDivided))
     index = parts_[index].data[0] + find_part(parts_[index].data[1], u, v);
   return index;
 }
 
 ExitanceField::Patch ExitanceField::patch(const Part& part) const noexcept {
   const auto& t = part.data;
-  return part.mark & kCurved ? patches_[t[0]] : Patch{{t[0], t[1], t[2], kNone, kNone, kNone}};
+  return is_kind(part, kCurved) ? patches_[t[0]] : Patch{{t[0], t[1], t[2], kNone, kNone, kNone}};
 }
 
 void ExitanceField::fetch_nodes(const Part& part) const noexcept {
-  if (!(part.mark & kCurved)) {
+  if (!is_kind(part, kCurved)) {
     for (const std::uint32_t node : part.data) __builtin_prefetch(&values_[node]);
   } else {
     for (const std::uint32_t node : patches_[part.data[0]].nodes)
@@ -115,7 +124,7 @@ void ExitanceField::fill(std::uint64_t& evaluations) const {
   evaluations += sum;
   parallel_for(parts_.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      if (!(parts_[i].mark & kDivided)) judge(parts_[i]);
+      if (!is_kind(parts_[i], kDivided)) judge(parts_[i]);
   });
 }
 
@@ -156,7 +165,7 @@ std::size_t ExitanceField::filled_node_count() const {
 
 // Once its nodes are known, whether a patch may be interpolated.
 void ExitanceField::judge(Part& part) const noexcept {
-  const std::uint32_t kind = std::atomic_ref(part.mark).load(std::memory_order_relaxed) & ~kKnown;
+  const std::uint32_t kind = load_mark(part, std::memory_order_relaxed) & ~kKnown;
   std::atomic_ref(part.mark).store(kind | (is_steep(patch(part)) ? kSteep : kSmooth),
                                    std::memory_order_release);
 }

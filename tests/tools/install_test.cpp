@@ -45,7 +45,8 @@ TEST_F(Install, AConsumerBuildsAndRuns) {
   EXPECT_EQ(run(word(prefix + "/bin/nacre") + " --version"), std::string("nacre ") + nacre::kVersion + "\n");
 
   run(cmake + " -G Ninja -S " + word(NACRE_SOURCE_DIR "/tests/tools/consumer") + " -B " + word(build) +
-      " -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=" + word(prefix));
+      " -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS=" + word(NACRE_CXX_FLAGS) +
+      " -DCMAKE_PREFIX_PATH=" + word(prefix));
   run(cmake + " --build " + word(build));
   EXPECT_EQ(run(word(build + "/consumer") + " " + word(folder_ + "/one.exr")),
             std::string("nacre ") + nacre::kVersion + ", marble 1.50\n");
