@@ -1,4 +1,6 @@
 // Differences between two images, layer by layer.
+#include <bit>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <string_view>
@@ -40,7 +42,7 @@ void check_comparable(const Image& a, const Image& b, const std::string& layer) 
 double difference(float a, float b) {
   const double d = std::abs(static_cast<double>(a) - static_cast<double>(b));
   if (std::isfinite(d)) return d;
-  return std::memcmp(&a, &b, sizeof a) == 0 ? 0 : kInfinity;
+  return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b) ? 0 : kInfinity;
 }
 
 // error / size where no error is no matter how small the size is.

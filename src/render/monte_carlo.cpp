@@ -29,8 +29,8 @@ class RadialDensity {
       const double near = medium.scale / static_cast<double>(reduced.mean_free_path[k]);
       const double far = static_cast<double>(reduced.sigma_tr[k]) * medium.scale;
       // A slower fall than across the whole object would waste samples.
-      rates_[static_cast<std::size_t>(2 * k)] = std::max(near, 1 / diameter);
-      rates_[static_cast<std::size_t>(2 * k + 1)] = std::max(far, 1 / diameter);
+      rates_[2 * static_cast<std::size_t>(k)] = std::max(near, 1 / diameter);
+      rates_[2 * static_cast<std::size_t>(k) + 1] = std::max(far, 1 / diameter);
     }
   }
   double sample(double choice, double u) const {

@@ -134,7 +134,7 @@ std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderPara
   parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       loop.render_tile(tiles[i], pictures, totals);
-      progress.advance(static_cast<std::size_t>(tiles[i].width * tiles[i].height));
+      progress.advance(static_cast<std::size_t>(tiles[i].width) * static_cast<std::size_t>(tiles[i].height));
     }
   });
   progress.end();
@@ -157,6 +157,7 @@ std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderPara
   for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
   std::vector<Image> images;
+  images.reserve(pictures.size());
   for (const PixelBuffer& pixels : pictures) images.push_back(pixels.make_image(params));
   return images;
 }

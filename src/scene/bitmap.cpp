@@ -31,7 +31,7 @@ enum class Format { kPng, kJpeg, kHdr, kExr };
 std::int64_t pixels_per_byte(Format format) {
   switch (format) {
     case Format::kPng:
-      return 8 * 1032;
+      return std::int64_t{8} * 1032;
     case Format::kJpeg:
       return 2048;
     default:

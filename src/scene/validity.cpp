@@ -117,6 +117,7 @@ Warnings check_bodies(const Scene& scene) {
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
     const std::vector<std::uint32_t> shapes = shapes_of_medium(scene, m);
     std::vector<const Mesh*> meshes;
+    meshes.reserve(shapes.size());
     for (const std::uint32_t i : shapes) meshes.push_back(&scene.shapes[i].mesh);
     const float near = kNear * smallest_mean_free_path(scene.media[m]) / scene.media[m].scale;
     std::map<PieceFault, std::size_t> counts;

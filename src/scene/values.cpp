@@ -98,7 +98,7 @@ Matrix4 parse_operation(const XmlElement& element) {
       fail(ErrorCode::kValue, element.place(), "the last row of <matrix> has to be 0 0 0 1");
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column)
-        matrix[column][row] = m[static_cast<std::size_t>(4 * row + column)];
+        matrix[column][row] = m[4 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column)];
   }
   return matrix;
 }
