@@ -20,7 +20,7 @@ namespace nacre::soak {
 namespace {
 
 // Pictures are small: few points make the RMSE of a frame uncertain.
-constexpr int kVerifiedPixels = 600;
+constexpr int kVerifiedPixels = 600, kMoreVerifiedPixels = 6000;
 constexpr double kMostSamples = 20e3;
 
 // What a scene that is sound cannot make fail: an error there is a violation.
@@ -115,7 +115,10 @@ Image crop(const Image& image, const RenderParams& part) {
 }
 
 std::string check_sum(const Renderer& renderer, const RenderParams& params, Trial& trial) {
-  const Verification error = renderer.verify(params, kVerifiedPixels);
+  Verification error = renderer.verify(params, kVerifiedPixels);
+  // What is promised is the RMSE of the picture: a few points more or less near an edge must not decide.
+  if (!trial.certified && error.relative_rmse > trial.tolerance)
+    error = renderer.verify(params, kMoreVerifiedPixels);
   trial.points = error.points;
   trial.relative_rmse = error.relative_rmse;
   trial.largest = trial.certified ? error.largest_anywhere : error.largest;
