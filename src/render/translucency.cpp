@@ -49,7 +49,8 @@ Translucency::Translucency(const World& world, std::size_t medium, const Medium&
 }
 
 // Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
-// so many mean free paths that nodes would fill the memory, pixels are fewer.
+// so many mean free paths that nodes would fill the memory, pixels are fewer. On a body of a few of them M_o
+// follows the body's own shape, and where light is absorbed rather than scattered it falls faster.
 void Translucency::make_field(const CacheGroup& group, double tolerance) {
   const Medium& m = material_;
   std::vector<const Mesh*> meshes;
@@ -57,7 +58,13 @@ void Translucency::make_field(const CacheGroup& group, double tolerance) {
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
   const double length = double{smallest_mean_free_path(m)} / double{m.scale};
   if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
-  const double distance = ExitanceField::node_distance(tolerance) * length;
+  if (group.size() == 0) return;
+  constexpr double kNodesPerRadius = 3, kAbsorbing = 0.75;
+  const Rgb alpha = reduce(m).alpha_prime;
+  const bool absorbing = std::min({alpha.x, alpha.y, alpha.z}) < 0.8f;
+  const double distance =
+      std::min(ExitanceField::node_distance(tolerance) * length * (absorbing ? kAbsorbing : 1),
+               double{group.nodes[0].radius} / kNodesPerRadius);
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance, tolerance);
 }
