@@ -78,7 +78,8 @@ std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::st
     const std::optional<Rgb> scale =
         equals == std::string::npos ? std::nullopt : parse_scale(argument.substr(equals + 1));
     if (!scale)
-      throw UsageError(place + " " + argument + ": write it as ID=SCALE or ID=r,g,b, numbers from 0 to 1e9");
+      throw UsageError(
+          fmt::format("{} {}: write it as ID=SCALE or ID=r,g,b, numbers from 0 to 1e9", place, argument));
     const std::string id = argument.substr(0, equals);
     bool found = false;
     for (std::size_t i = 0; i < scales.size(); ++i)
