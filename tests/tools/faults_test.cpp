@@ -96,7 +96,7 @@ TEST_F(Faults, StandardStreamsThatCannotBeWritten) {
     expect_error(std::string("$N ") + command + " > /dev/full",
                  "standard output: cannot write: No space left");
     expect_error(std::string("$N ") + command + " >&-", "standard output: cannot write: Bad file descriptor");
-    expect_error(std::string("set -o pipefail; $N ") + command + " | true",
+    expect_error(std::string("set -o pipefail; { sleep 1; $N ") + command + "; } | true",
                  "standard output: cannot write: Broken pipe");
   }
   // Nothing that is written takes the place of a stream.
