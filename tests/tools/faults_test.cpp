@@ -128,7 +128,7 @@ TEST_F(Faults, ACacheThatChangesWhileItIsRead) {
   const std::string whole = read_file(folder_.file("c.nacre"));
   const auto render = [](const std::string& change) {
     return "$N render s.xml --cache c.nacre --spp 64 -o a.exr --quiet & "
-           "until grep -q c.nacre /proc/$!/maps; do sleep 0.02; done; " +
+           "for i in {1..500}; do grep -q c.nacre /proc/$!/maps && break; sleep 0.02; done; " +
            change + "; wait $!";
   };
   expect_error(render(": > c.nacre"), "c.nacre: was ");
