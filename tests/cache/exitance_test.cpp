@@ -348,9 +348,7 @@ TEST_P(EveryKind, UnitsDoNotMatter) {
     SurfaceSamples scaled = samples;
     for (Vec3& p : scaled.positions) p *= unit;
     for (float& area : scaled.areas) area *= unit * unit;
-    Medium medium = make_medium(*find_preset("Marble"));
-    medium.profile = GetParam();
-    medium.scale = 5 / unit;
+    const Medium medium = make_material("Marble", GetParam(), 5 / unit);
     const OwnedGroup owned = make_group(scaled);
     std::vector<Vec3> points;
     for (std::size_t i = 0; i < scaled.size(); i += 13) points.push_back(1.01f * scaled.positions[i]);

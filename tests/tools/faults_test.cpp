@@ -40,7 +40,7 @@ class Faults : public testing::Test {
   // In a namespace of mounts of its own; false where the machine allows none.
   bool can_mount() const { return run("unshare -rm mount -t tmpfs none . 2>/dev/null").exit_code == 0; }
   static std::string with_mounts(const std::string& script) {
-    return "unshare -rm bash -ec '" + script + "'";
+    return "unshare -rm bash -ec 'N=\"" NACRE_PROGRAM "\"; " + script + "'";
   }
   TemporaryFolder folder_;
 };
@@ -57,15 +57,14 @@ TEST_F(Faults, AFullDisk) {
   expect_error(kShort + " -o /dev/full", "/dev/full: cannot write: No space left on device");
   if (!can_mount()) GTEST_SKIP() << "this machine lets nobody mount";
   std::filesystem::create_directory(folder_.file("disk"));
-  const std::string mount = "N=\"" NACRE_PROGRAM "\"; mount -t tmpfs -o size=64k none disk; ";
+  const std::string mount = "mount -t tmpfs -o size=64k none disk; ";
   for (const std::string& command :
        {std::string("$N bake s.xml --points 2000 --irradiance-samples 1 -o disk/a.nacre --quiet"),
         kShort + " --aov all -o disk/a.exr"})
     expect_error(with_mounts(mount + "set +e; " + command + "; code=$?; ls -A disk; exit $code"),
                  "No space left on device");
-  expect_error(
-      with_mounts("N=\"" NACRE_PROGRAM "\"; mount -t tmpfs -o ro none disk; " + kShort + " -o disk/a.exr"),
-      "disk/a.exr: cannot write: Read-only file system");
+  expect_error(with_mounts("mount -t tmpfs -o ro none disk; " + kShort + " -o disk/a.exr"),
+               "disk/a.exr: cannot write: Read-only file system");
 }
 
 // What had been there stays as it was.
@@ -84,8 +83,7 @@ TEST_F(Faults, WithoutProc) {
   if (!can_mount()) GTEST_SKIP() << "this machine lets nobody mount";
   ASSERT_EQ(run(kShort + " -o a.exr; mv a.exr b.exr").exit_code, 0);
   const std::size_t before = folder_.count();
-  const ProgramResult result =
-      run(with_mounts("N=\"" NACRE_PROGRAM "\"; mount -t tmpfs none /proc; " + kShort + " -o a.exr"));
+  const ProgramResult result = run(with_mounts("mount -t tmpfs none /proc; " + kShort + " -o a.exr"));
   EXPECT_EQ(result.exit_code, 0) << result.output;
   EXPECT_EQ(folder_.count(), before + 1);
   EXPECT_TRUE(same("a.exr", "b.exr"));
