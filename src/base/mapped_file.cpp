@@ -22,8 +22,13 @@ std::mutex mappings_mutex;
 struct MappedFile::State {
   std::string path;
   int descriptor;
-  struct stat opened;
-  FileInUse in_use;
+  struct stat opened {};
+  FileInUse in_use{};
+
+  State(const std::string& name, int open_descriptor) : path(name), descriptor(open_descriptor) {}
+  ~State() { ::close(descriptor); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
 
   static std::set<const State*>& all() {
     static std::set<const State*> states;
@@ -44,18 +49,13 @@ MappedFile::MappedFile(const std::string& path, const char* name) {
     fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path,
          "cannot read the {}: {}", name, std::strerror(error));
   }
-  state_ = std::make_unique<State>(State{path, descriptor, {}, {}});
-  if (::fstat(descriptor, &state_->opened) != 0 || !S_ISREG(state_->opened.st_mode)) {
-    ::close(descriptor);
+  state_ = std::make_unique<State>(path, descriptor);
+  if (::fstat(descriptor, &state_->opened) != 0 || !S_ISREG(state_->opened.st_mode))
     fail(ErrorCode::kNotACache, path, "is not a regular file");
-  }
   if (const auto size = static_cast<std::size_t>(state_->opened.st_size); size > 0) {
     void* const address = ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
-    if (address == MAP_FAILED) {
-      const int error = errno;
-      ::close(descriptor);
-      fail(ErrorCode::kIo, path, "cannot map the {}: {}", name, std::strerror(error));
-    }
+    if (address == MAP_FAILED)
+      fail(ErrorCode::kIo, path, "cannot map the {}: {}", name, std::strerror(errno));
     bytes_ = {static_cast<const unsigned char*>(address), size};
     state_->in_use = FileInUse::mapping(path, address, size);
   }
@@ -70,7 +70,6 @@ MappedFile::~MappedFile() {
   }
   state_->in_use = {};
   if (!bytes_.empty()) ::munmap(const_cast<unsigned char*>(bytes_.data()), bytes_.size());
-  ::close(state_->descriptor);
 }
 
 void MappedFile::check_unchanged() {
