@@ -54,6 +54,22 @@ struct AtomicFile::Temporary {
   FileInUse in_use = FileInUse::temporary(path);
 };
 
+// Calls make(path), which gives a descriptor or 0, or -1 and errno, until the name is free: another machine,
+// or a process that was killed, may have left one of the same number.
+template <class Make>
+int AtomicFile::make_temporary(const Make& make) {
+  int result = 0;
+  do {
+    temporary_ = std::make_unique<Temporary>(target_);
+    result = make(temporary_->path.c_str());
+  } while (result < 0 && errno == EEXIST);
+  if (result >= 0) return result;
+  const int error = errno;
+  temporary_.reset();  // it is somebody else's, if anybody's
+  errno = error;
+  fail_io(path_, "write");
+}
+
 AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follow_links(path_)) {
   struct stat status;
   if (::stat(target_.c_str(), &status) == 0) {
@@ -75,35 +91,9 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follo
     ::close(descriptor_);  // no /proc: it could never get a name
     descriptor_ = -1;
   }
-  if (descriptor_ < 0) create_named();
-}
-
-// Another machine, or a process that was killed, may have left one of the same number.
-void AtomicFile::create_named() {
-  do {
-    temporary_ = std::make_unique<Temporary>(target_);
-    descriptor_ = ::open(temporary_->path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (descriptor_ < 0 && errno == EEXIST);
-  if (descriptor_ >= 0) return;
-  const int error = errno;
-  temporary_.reset();  // it is somebody else's, if anybody's
-  errno = error;
-  fail_io(path_, "write");
-}
-
-// A file cannot be linked over another one, only renamed.
-void AtomicFile::give_name() {
-  int result = 0;
-  do {
-    temporary_ = std::make_unique<Temporary>(target_);
-    result = ::linkat(AT_FDCWD, link_to(descriptor_).c_str(), AT_FDCWD, temporary_->path.c_str(),
-                      AT_SYMLINK_FOLLOW);
-  } while (result != 0 && errno == EEXIST);
-  if (result == 0) return;
-  const int error = errno;
-  temporary_.reset();
-  errno = error;
-  fail_io(path_, "write");
+  if (descriptor_ < 0)
+    descriptor_ = make_temporary(
+        [](const char* name) { return ::open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
 }
 
 AtomicFile::~AtomicFile() {
@@ -130,7 +120,11 @@ void AtomicFile::commit() {
   MappedFile::check_unchanged();
   if (!device_) {
     if (::fsync(descriptor_) != 0) fail_io(path_, "write");
-    if (!temporary_) give_name();
+    // A file cannot be linked over another one, only renamed.
+    if (!temporary_)
+      make_temporary([&](const char* name) {
+        return ::linkat(AT_FDCWD, link_to(descriptor_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW);
+      });
   }
   const int descriptor = descriptor_;
   descriptor_ = -1;

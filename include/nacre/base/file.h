@@ -33,8 +33,8 @@ class AtomicFile {
 
  private:
   struct Temporary;
-  void create_named();
-  void give_name();
+  template <class Make>
+  int make_temporary(const Make& make);
 
   std::string path_, target_;
   std::unique_ptr<Temporary> temporary_;  // none: a device, or without a name
