@@ -192,7 +192,7 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
                              double tolerance)
     : exitance_(exitance),
       meshes_(std::move(meshes)),
-      most_bend_(static_cast<float>(0.08 * std::pow(strictness(tolerance), 2.0 / 3))),
+      most_bend_(static_cast<float>(0.05 * std::pow(strictness(tolerance), 2.0 / 3))),
       most_change_(static_cast<float>(0.4 * std::sqrt(strictness(tolerance)))) {
   std::size_t vertices = 0;
   for (const Mesh* const mesh : meshes_)
