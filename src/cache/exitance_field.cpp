@@ -177,9 +177,8 @@ bool ExitanceField::is_steep(const Patch& patch) const noexcept {
   for (std::size_t i = 0; i < 3; ++i) {
     const Float4 a = values_[patch.nodes[i]], b = values_[patch.nodes[(i + 1) % 3]];
     const Float4 mean = (a + b) * broadcast(0.5f);
-    if (patch.nodes[3 + i] == kNone) {
-      if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
-    } else {
+    if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
+    if (patch.nodes[3 + i] != kNone) {
       const Float4 middle = values_[patch.nodes[3 + i]];
       if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(most_bend_))) return true;
     }
