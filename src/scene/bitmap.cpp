@@ -10,8 +10,10 @@
 #include "scene/bitmap_exr.h"
 #include "scene/picture_guard.h"
 
+#ifndef __clang_analyzer__  // which follows paths into stb's own code
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
+#endif
 #define STBI_NO_STDIO
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
