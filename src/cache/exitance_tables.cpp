@@ -18,9 +18,11 @@ namespace {
 // over a picture, makes use of.
 constexpr double kCalibration = 11.5, kGrowth = 0.26;
 
-// Bodies of a smaller radius, in mean free paths, are summed as so few nodes that less cancels, down to a
-// share of it.
-constexpr double kManyLengths = 6, kFewest = 0.2;
+// Light that falls on fewer pieces of a mean free path is summed as so few nodes that less cancels; and
+// nothing does where there is but one, which is never allowed less than this.
+constexpr double kManyPieces = 400, kAlone = 2.5;
+// Pieces are no smaller than this share of the body.
+constexpr double kSmallestPiece = 1.0 / 256;
 
 // A series may err in the corners of its cell; in the rest of it, and over all directions, it errs by this
 // share of the bound on its third derivatives.
@@ -63,7 +65,7 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
       spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
       kernel_(resolved_profiles(in_units(medium, unit_), spacing_)),
       promise_(promise),
-      allowance_(tolerance * kCalibration * std::pow(tolerance / 0.001, kGrowth)) {
+      allowance_(tolerance) {
   if (group.size() == 0) return;
   const OctreeNode root = make_octree_node(0);
   const Vec3 least = Vec3(root.centre[0], root.centre[1], root.centre[2]) - Vec3(root.radius),
@@ -75,8 +77,11 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
                          0x1p-20 * double{size.x}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
   if (!(spacing_ > 0)) spacing_ = cell_size_;
-  if (promise == Promise::kCalibrated)
-    allowance_ *= std::clamp(double{root.radius} / (kManyLengths * length), kFewest, 1.0);
+  if (promise == Promise::kCalibrated) {
+    const double most = kCalibration * std::pow(tolerance / 0.001, kGrowth);
+    allowance_ *=
+        std::clamp(most * std::sqrt(lit_pieces(length) / kManyPieces), std::min(kAlone, most), most);
+  }
   // Hardly any less where that is a mean free path or more, a tenth at half of one.
   if (promise == Promise::kCalibrated)
     own_share_ = 1 / (1 + 0.4 * std::pow(decay(make_profiles(in_units(medium, unit_))) * length, 6));
@@ -99,6 +104,28 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   copy_octree();
   add_all_moments();
   make_tables();
+}
+
+// How many nodes of about that radius would have the light if each had as much.
+double Exitance::lit_pieces(double radius) const {
+  radius = std::max(radius, kSmallestPiece * double{make_octree_node(0).radius});
+  std::vector<std::uint32_t> open{0};
+  Vec3d sum(0, 0, 0), squares(0, 0, 0);
+  while (!open.empty()) {
+    const OctreeNode node = make_octree_node(open.back());
+    open.pop_back();
+    if (double{node.radius} > radius && node.child_count() > 0) {
+      for (std::uint32_t c = 0; c < node.child_count(); ++c) open.push_back(node.first_child + c);
+      continue;
+    }
+    const Vec3d power(node.power[0], node.power[1], node.power[2]);
+    sum += power;
+    squares += power * power;
+  }
+  double fewest = kNoLimit;
+  for (int k = 0; k < 3; ++k)
+    if (squares[k] > 0) fewest = std::min(fewest, square(sum[k]) / squares[k]);
+  return fewest;
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

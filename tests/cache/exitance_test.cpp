@@ -62,7 +62,7 @@ struct Lighting {
   Rgb (*light)(const Vec3&, const Vec3&);
 };
 const Lighting kLightings[] = {
-    {"uniform", &uniform_light}, {"side", &side_light}, {"coloured", &coloured_light}};
+    {"uniform", &uniform_light}, {"side", &side_light}, {"coloured", &coloured_light}, {"spot", &spot_light}};
 
 // mm per unit at which n samples have about the spacing that bake gives by default.
 float default_scale(const char* preset, const SurfaceSamples& samples) {

@@ -23,6 +23,12 @@ inline Rgb coloured_light(const Vec3& p, const Vec3&) {
           3 * std::exp(-4 * (p - Vec3(-0.5f, 0, 0)).length2()),
           2 * std::exp(-2 * (p - Vec3(0, 0.7f, 0)).length2())};
 }
+/// On a spot near the edge of planes, and so noisy that every other sample there is dark.
+inline Rgb spot_light(const Vec3& p, const Vec3&) {
+  const bool lit = (p - Vec3(0.9f, 0.1f, 0.2f)).length2() < square(0.3f) &&
+                   hash_words(19, std::bit_cast<std::uint32_t>(p.x)) % 2 == 0;
+  return lit ? Rgb(1, 0.5f, 0.8f) : Rgb(0, 0, 0);
+}
 
 inline void add_sample(SurfaceSamples& samples, const Vec3& position, const Vec3& normal, double area,
                        const Light& light) {

@@ -95,6 +95,7 @@ class Exitance {
   SumSource make_source(std::size_t sample) const noexcept;
   OctreeNode make_octree_node(std::uint32_t index) const noexcept;
   std::vector<Vec3> scaled(std::span<const Vec3> points) const;
+  double lit_pieces(double radius) const;
   void copy_octree();
   void add_all_moments();
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
