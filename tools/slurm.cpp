@@ -55,7 +55,7 @@ void require_slurm() {
 }
 
 std::string parse_slurm_option(const std::string& text) {
-  const std::string option = text.starts_with("-") ? text : "--" + text;
+  std::string option = text.starts_with("-") ? text : "--" + text;
   const std::string name = option.substr(0, option.find('='));
   for (const char* const own : {"--array", "--dependency", "--output", "--error", "--parsable", "--wrap"})
     if (name == own) throw UsageError("--slurm-option " + text + ": that is nacre's to set");
@@ -75,7 +75,7 @@ std::string submit_job(const SlurmJob& job) {
     words.insert(words.end(), {"--dependency=afterok:" + job.after, "--kill-on-invalid-dep=yes"});
   words.push_back(job.script_path);
   const CommandResult result = run_command(words);
-  const std::string id = find_job_id(result.output);
+  std::string id = find_job_id(result.output);
   if (result.exit_code != 0 || id.empty())
     fail(ErrorCode::kIo, "--engine slurm", "{}", join_lines(result.output));
   return id;

@@ -136,9 +136,9 @@ void render_batch(const Options& options, std::size_t medium, std::span<const Po
     save_exr(images[i], path);
     save_record(options.output, point.index, *point.settings,
                 {point.key, bytes_digest(read_text_file(path, std::size_t{1} << 40)), share});
-    std::string label;
-    for (const Setting& setting : *point.settings) label += (label.empty() ? "" : ", ") + describe(setting);
-    session.progress().say(path + ": " + label);
+    std::vector<std::string> settings(point.settings->size());
+    std::ranges::transform(*point.settings, settings.begin(), &describe);
+    session.progress().say(fmt::format("{}: {}", path, fmt::join(settings, ", ")));
   }
 }
 
@@ -272,8 +272,8 @@ void assemble(const Options& options, const SweepPlan& plan, const std::vector<P
 }
 
 std::vector<std::string> keys_of(const std::vector<Point>& points) {
-  std::vector<std::string> keys;
-  for (const Point& point : points) keys.push_back(point.key);
+  std::vector<std::string> keys(points.size());
+  std::ranges::transform(points, keys.begin(), &Point::key);
   return keys;
 }
 
