@@ -31,10 +31,10 @@ constexpr double kPointsPerCell = 32, kSpacingsPerCell = 2;
 // A block (level kBlockLevels), a cell (level 0) or one between: what all its points share.
 struct Exitance::Target {
   Vec3 centre;
-  float radius;        // of a ball around all its points
-  LocalExpansion far;  // of what is far from all of it
-  Float4 total;        // about what the sum is
-  IndexList pending;   // octree nodes that its parts deal with
+  float radius;                     // of a ball around all its points
+  std::vector<LocalExpansion> far;  // of what is far from all of it, by material
+  Totals total;                     // about what the sum is, by guide
+  IndexList pending;                // octree nodes that its parts deal with
 };
 
 struct Exitance::Room {
@@ -71,7 +71,7 @@ void Exitance::place(Target& target, std::span<const Point> range, int level, co
 
 // A guess of the sum at the target's centre, good to a factor of two, which is all that errors need to be
 // measured against; or, certified, a lower bound for all its points.
-Float4 Exitance::weigh(const Target& target, Room& room) const {
+Float4 Exitance::weigh(const Kernel& kernel, const Target& target, Room& room) const {
   const bool certified = promise_ == Promise::kCertified;
   const CoarseTest test{nodes_.data(), target.centre, certified ? kBoundRatio : kGuessRatio, certified,
                         target.radius};
@@ -80,7 +80,7 @@ Float4 Exitance::weigh(const Target& target, Room& room) const {
   room.nodes.work.push(0);
   while (room.nodes.work.size() > 0) {
     room.nodes.opened.clear();
-    room.evaluations += lanes::add_coarsely(kernel_.tables(), test, room.nodes, total);
+    room.evaluations += lanes::add_coarsely(kernel.tables(), test, room.nodes, total);
     room.nodes.work.clear();
     for (const std::uint32_t index : room.nodes.opened.span())
       room.nodes.work.push_run(nodes_[index].first, nodes_[index].child_count());
@@ -88,22 +88,58 @@ Float4 Exitance::weigh(const Target& target, Room& room) const {
   return total;
 }
 
-Rgb Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
+Exitance::Totals Exitance::weigh(const Target& target, Room& room) const {
+  Totals totals;
+  for (std::size_t g = 0; g < guides_.size(); ++g)
+    totals[g] = weigh(kernels_[guides_[g].kernel], target, room);
+  return totals;
+}
+
+// What nodes may err by at every distance, the least of all guides.
+void Exitance::make_limits(const Target& target, Room& room) const {
+  const double classes =
+      std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
+  const auto data = [](const std::array<std::vector<float>, 3>& channels) {
+    return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
+  };
+  room.limits.resize(lean_.size());
+  for (std::size_t g = 0; g < guides_.size(); ++g) {
+    const Guide& guide = guides_[g];
+    Rgb share(0, 0, 0);
+    const double factor = 0.5 * allowance_;
+    for (int k = 0; k < 3; ++k)
+      if (nodes_[0].power[k] > 0)
+        share[k] = static_cast<float>(factor) * target.total[g][k] / nodes_[0].power[k];
+    const Radius& radius = guide.radii[static_cast<std::size_t>(
+        std::clamp(classes, 0.0, static_cast<double>(guide.radii.size() - 1)))];
+    lanes::make_limits(
+        {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(guide.per_third)},
+        share, lean_.size(), g > 0, room.limits.data());
+  }
+  // All that is nearer than the bins reach.
+  room.limits[0].as_point = room.limits[0].in_series = -1;
+}
+
+void Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
   const Vec3& x = room.points[point.index];
-  const Float4 far = target.far.eval(x - target.centre);
-  std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
-  lanes::add_sources(kernel_.tables(), room.list, x, sum);
-  room.evaluations += room.list.size();
-  Rgb value;
-  for (int k = 0; k < 3; ++k) value[k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
-  return value;
+  Rgb* const values = &room.exitance[point.index * material_count_];
+  for (std::size_t m = 0; m < material_count_; ++m) {
+    const Float4 far = target.far[m].eval(x - target.centre);
+    std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
+    lanes::add_sources(kernels_[m].tables(), room.list, x, sum);
+    for (int k = 0; k < 3; ++k)
+      values[m][k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
+  }
+  room.evaluations += material_count_ * room.list.size();
 }
 
 // Sums up for the points of one block or cell, which follow each other.
 void Exitance::eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const {
   Target& target = room.targets[static_cast<std::size_t>(level)];
   place(target, range, level, room);
-  target.far = parent ? parent->far.moved(target.centre - parent->centre) : LocalExpansion{};
+  target.far.resize(material_count_);
+  for (std::size_t m = 0; m < material_count_; ++m)
+    target.far[m] = parent ? parent->far[m].moved(target.centre - parent->centre) : LocalExpansion{};
   target.pending.clear();
   const double side = cell_size_ * static_cast<double>(1 << level) / spacing_;
   const double work = static_cast<double>(range.size()) * std::max(1.0, std::sqrt(side / kSpacingsPerCell));
@@ -112,23 +148,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
 
   // The sum hardly changes within a cell of a few samples.
   target.total = room.whole && level <= kInheritLevel ? parent->total : weigh(target, room);
-  Rgb share(0, 0, 0);
-  const double factor = 0.5 * allowance_;
-  for (int k = 0; k < 3; ++k)
-    if (nodes_[0].power[k] > 0) share[k] = static_cast<float>(factor) * target.total[k] / nodes_[0].power[k];
-  const double classes =
-      std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
-  const Radius& radius =
-      radii_[static_cast<std::size_t>(std::clamp(classes, 0.0, static_cast<double>(radii_.size() - 1)))];
-  const auto data = [](const std::array<std::vector<float>, 3>& channels) {
-    return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
-  };
-  room.limits.resize(lean_.size());
-  lanes::make_limits(
-      {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(per_third_)}, share,
-      lean_.size(), room.limits.data());
-  // All that is nearer than the bins reach.
-  room.limits[0].as_point = room.limits[0].in_series = -1;
+  make_limits(target, room);
 
   const bool certified = promise_ == Promise::kCertified;
   const float weight = certified ? 1 : kMomentWeight;
@@ -177,9 +197,12 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     target.pending.append(nodes.pending.span());
   }
   if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
-  lanes::add_series(kernel_.tables(), nodes_.data(), nodes.far.span(), target.centre, target.far);
-  lanes::add_series(kernel_.tables(), sources_.data(), nodes.far_samples.span(), target.centre, target.far);
-  room.evaluations += nodes.far.size() + nodes.far_samples.size();
+  for (std::size_t m = 0; m < material_count_; ++m) {
+    const KernelTables tables = kernels_[m].tables();
+    lanes::add_series(tables, nodes_.data(), nodes.far.span(), target.centre, target.far[m]);
+    lanes::add_series(tables, sources_.data(), nodes.far_samples.span(), target.centre, target.far[m]);
+  }
+  room.evaluations += material_count_ * (nodes.far.size() + nodes.far_samples.size());
 
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
@@ -187,7 +210,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       room.list.add({node.x, node.y, node.z, 0, node.power});
     }
     room.list.pad();
-    for (const Point& point : range) room.exitance[point.index] = eval_point(target, point, room);
+    for (const Point& point : range) eval_point(target, point, room);
     return;
   }
   target.pending.append(nodes.points.span());
@@ -219,7 +242,8 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
     if (in_grid(points[i]))
       order.push_back({cell_code(points[i]), i});
     else  // far away from all samples, where no surface is
-      sum_exactly(std::span(places).subspan(i, 1), exitance.subspan(i, 1), evaluations);
+      sum_exactly(std::span(places).subspan(i, 1), exitance.subspan(i * material_count_, material_count_),
+                  evaluations);
   }
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
@@ -249,18 +273,19 @@ void Exitance::eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance,
 void Exitance::sum_exactly(std::span<const Vec3> points, std::span<Rgb> exitance,
                            std::uint64_t& evaluations) const {
   constexpr std::size_t kChunk = 4096;
-  std::vector<std::array<double, 3>> totals(points.size());
+  std::vector<std::array<double, 3>> totals(exitance.size());
   SourceList list;
   for (std::size_t begin = 0; begin < group_.size(); begin += kChunk) {
     list.clear();
     for (std::size_t i = begin; i < std::min(begin + kChunk, group_.size()); ++i) list.add(make_source(i));
     list.pad();
-    for (std::size_t i = 0; i < points.size(); ++i)
-      lanes::add_sources(kernel_.tables(), list, points[i], totals[i]);
+    for (std::size_t i = 0; i < exitance.size(); ++i)
+      lanes::add_sources(kernels_[i % material_count_].tables(), list, points[i / material_count_],
+                         totals[i]);
   }
-  for (std::size_t i = 0; i < points.size(); ++i)
+  for (std::size_t i = 0; i < exitance.size(); ++i)
     for (int k = 0; k < 3; ++k) exitance[i][k] = static_cast<float>(totals[i][static_cast<std::size_t>(k)]);
-  evaluations += points.size() * group_.size();
+  evaluations += exitance.size() * group_.size();
 }
 
 }  // namespace nacre

@@ -17,6 +17,7 @@ namespace {
 enum BlockState : std::uint8_t { kEmpty, kBusy, kFull };
 
 Rgb to_rgb(Float4 v) noexcept { return {v[0], v[1], v[2]}; }
+Float4 to_float4(const Rgb& v) noexcept { return Float4{v.x, v.y, v.z, 0}; }
 Float4 larger(Float4 a, Float4 b) noexcept { return a > b ? a : b; }
 Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
 
@@ -69,16 +70,15 @@ ExitanceField::Patch ExitanceField::patch(const Part& part) const noexcept {
 }
 
 void ExitanceField::fetch_nodes(const Part& part) const noexcept {
+  constexpr std::size_t kLine = 64 / sizeof(Float4);
+  const auto fetch = [&](std::uint32_t node) {
+    for (std::size_t m = 0; m < materials_; m += kLine) __builtin_prefetch(values(node) + m);
+  };
   if (!is_kind(part, kCurved)) {
-    for (const std::uint32_t node : part.data) __builtin_prefetch(&values_[node]);
+    for (const std::uint32_t node : part.data) fetch(node);
   } else {
-    for (const std::uint32_t node : patches_[part.data[0]].nodes)
-      __builtin_prefetch(&values_[node != kNone ? node : 0]);
+    for (const std::uint32_t node : patches_[part.data[0]].nodes) fetch(node != kNone ? node : 0);
   }
-}
-
-void ExitanceField::set_value(std::uint32_t node, const Rgb& value) const noexcept {
-  values_[node] = Float4{value.x, value.y, value.z, 0};
 }
 
 // Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.
@@ -87,11 +87,12 @@ void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint
   for (const std::uint32_t block : blocks)
     positions.insert(positions.end(), positions_.begin() + block_begin_[block],
                      positions_.begin() + block_begin_[block + 1]);
-  std::vector<Rgb> values(positions.size());
-  exitance_.eval_whole(positions, values, evaluations);
-  auto value = values.begin();
+  std::vector<Rgb> results(positions.size() * materials_);
+  exitance_.eval_whole(positions, results, evaluations);
+  auto result = results.begin();
   for (const std::uint32_t block : blocks) {
-    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i) set_value(i, *value++);
+    for (Float4* to = values(block_begin_[block]); to != values(block_begin_[block + 1]); ++to)
+      *to = to_float4(*result++);
     block_state_[block].store(kFull, std::memory_order_release);
     block_state_[block].notify_all();
   }
@@ -140,7 +141,7 @@ KeptExitance ExitanceField::keep() const {
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {
     if (block_state_[block].load(std::memory_order_acquire) != kFull) continue;
     kept.filled[block] = 1;
-    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
+    for (std::size_t i = block_begin_[block] * materials_; i < block_begin_[block + 1] * materials_; ++i)
       kept.values[i] = to_rgb(values_[i]);
   }
   return kept;
@@ -149,8 +150,8 @@ KeptExitance ExitanceField::keep() const {
 void ExitanceField::restore(const KeptExitance& kept) const {
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {
     if (!kept.filled[block]) continue;
-    for (std::uint32_t i = block_begin_[block]; i < block_begin_[block + 1]; ++i)
-      set_value(i, kept.values[i]);
+    for (std::size_t i = block_begin_[block] * materials_; i < block_begin_[block + 1] * materials_; ++i)
+      values_[i] = to_float4(kept.values[i]);
     block_state_[block].store(kFull, std::memory_order_release);
   }
 }
@@ -175,24 +176,26 @@ bool ExitanceField::is_steep(const Patch& patch) const noexcept {
     return x[0] > most[0] || x[1] > most[1] || x[2] > most[2];
   };
   for (std::size_t i = 0; i < 3; ++i) {
-    const Float4 a = values_[patch.nodes[i]], b = values_[patch.nodes[(i + 1) % 3]];
-    const Float4 mean = (a + b) * broadcast(0.5f);
-    if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
-    if (patch.nodes[3 + i] != kNone) {
-      const Float4 middle = values_[patch.nodes[3 + i]];
+    const Float4 *const from = values(patch.nodes[i]), *const to = values(patch.nodes[(i + 1) % 3]);
+    const Float4* const between = patch.nodes[3 + i] != kNone ? values(patch.nodes[3 + i]) : nullptr;
+    for (std::size_t m = 0; m < materials_; ++m) {
+      const Float4 a = from[m], b = to[m], mean = (a + b) * broadcast(0.5f);
+      if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
+      if (!between) continue;
+      const Float4 middle = between[m];
       if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(most_bend_))) return true;
     }
   }
   return false;
 }
 
-Float4 ExitanceField::interpolate(const Patch& patch, float u, float v) const noexcept {
+Float4 ExitanceField::interpolate(const Patch& patch, float u, float v, std::size_t m) const noexcept {
   const float w = 1 - u - v;
-  const Float4 a = values_[patch.nodes[0]], b = values_[patch.nodes[1]], c = values_[patch.nodes[2]];
+  const Float4 a = values(patch.nodes[0])[m], b = values(patch.nodes[1])[m], c = values(patch.nodes[2])[m];
   Float4 value = a * broadcast(w) + b * broadcast(u) + c * broadcast(v);
   const auto bend = [&](std::size_t middle, Float4 from, Float4 to, float bump) {
     if (patch.nodes[middle] != kNone)
-      value += (values_[patch.nodes[middle]] - (from + to) * broadcast(0.5f)) * broadcast(bump);
+      value += (values(patch.nodes[middle])[m] - (from + to) * broadcast(0.5f)) * broadcast(bump);
   };
   bend(3, a, b, 4 * w * u);
   bend(4, b, c, 4 * u * v);
@@ -200,15 +203,16 @@ Float4 ExitanceField::interpolate(const Patch& patch, float u, float v) const no
   return larger(value, broadcast(0));  // a parabola may undershoot where light ends
 }
 
-// The value at a place whose nodes are known; false if it has to be evaluated itself.
-bool ExitanceField::look_up(const Place& place, Rgb& value) const noexcept {
+// The values at a place whose nodes are known; false if they have to be evaluated themselves.
+bool ExitanceField::look_up(const Place& place, Rgb* to) const noexcept {
   const std::uint32_t mark = mark_of(parts_[place.part]);
   const auto& [a, b, c] = parts_[place.part].data;
   const float u = place.u, v = place.v;
   if (mark & kSteep) return false;
-  value = to_rgb(mark & kCurved ? interpolate(patches_[a], u, v)
-                                : values_[a] * broadcast(1 - u - v) + values_[b] * broadcast(u) +
-                                      values_[c] * broadcast(v));
+  for (std::size_t m = 0; m < materials_; ++m)
+    to[m] = to_rgb(mark & kCurved ? interpolate(patches_[a], u, v, m)
+                                  : values(a)[m] * broadcast(1 - u - v) + values(b)[m] * broadcast(u) +
+                                        values(c)[m] * broadcast(v));
   return true;
 }
 
@@ -248,7 +252,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
       if (!(mark_of(parts_[place.part]) & kKnown)) {
         missing.push_back({i, place});
         if (recent.is_new(place.part)) parts.push_back(place.part);
-      } else if (!look_up(place, exitance[i])) {
+      } else if (!look_up(place, &exitance[i * materials_])) {
         steep.push_back(i);
       }
     }
@@ -261,15 +265,16 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   if (!missing.empty()) make_known(parts, evaluations);
   for (std::size_t i = 0; i < missing.size(); ++i) {
     fetch_nodes(parts_[missing[std::min(i + kAhead, missing.size() - 1)].place.part]);
-    if (!look_up(missing[i].place, exitance[missing[i].hit])) steep.push_back(missing[i].hit);
+    if (!look_up(missing[i].place, &exitance[missing[i].hit * materials_])) steep.push_back(missing[i].hit);
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;
   positions.reserve(steep.size());
   for (const std::uint32_t i : steep) positions.push_back(hit_position(*meshes_[hits[i].mesh], hits[i]));
-  std::vector<Rgb> values(steep.size());
-  exitance_.eval(positions, values, evaluations);
-  for (std::size_t i = 0; i < steep.size(); ++i) exitance[steep[i]] = values[i];
+  std::vector<Rgb> results(steep.size() * materials_);
+  exitance_.eval(positions, results, evaluations);
+  for (std::size_t i = 0; i < steep.size(); ++i)
+    std::copy_n(&results[i * materials_], materials_, &exitance[steep[i] * materials_]);
 }
 
 }  // namespace nacre

@@ -86,15 +86,18 @@ OctreeNode Exitance::make_octree_node(std::uint32_t index) const noexcept {
 Exitance::Grains Exitance::find_grains() const {
   Grains grains;
   if (promise_ == Promise::kCertified) return grains;
-  const DistanceBins bins = kernel_.bound_bins();
-  for (std::int32_t bin = bins.first; bin < bins.last; ++bin) {
-    const Kernel::Bounds& bounds = kernel_.bounds(std::bit_cast<float>(bin << bins.shift));
-    const Float4 least = kernel_.eval(std::bit_cast<float>((bin + 1) << bins.shift));
-    for (int k = 0; k < 3; ++k)
-      if (least[k] > 0) {
-        grains.bend = std::max(grains.bend, bounds.hessian[k] / least[k]);
-        grains.slope = std::max(grains.slope, bounds.slope[k] / least[k]);
-      }
+  for (const Guide& guide : guides_) {
+    const Kernel& kernel = kernels_[guide.kernel];
+    const DistanceBins bins = kernel.bound_bins();
+    for (std::int32_t bin = bins.first; bin < bins.last; ++bin) {
+      const Kernel::Bounds& bounds = kernel.bounds(std::bit_cast<float>(bin << bins.shift));
+      const Float4 least = kernel.eval(std::bit_cast<float>((bin + 1) << bins.shift));
+      for (int k = 0; k < 3; ++k)
+        if (least[k] > 0) {
+          grains.bend = std::max(grains.bend, bounds.hessian[k] / least[k]);
+          grains.slope = std::max(grains.slope, bounds.slope[k] / least[k]);
+        }
+    }
   }
   grains.allowed = static_cast<float>(kGrainShare * allowance_);
   return grains;

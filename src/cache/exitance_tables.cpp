@@ -48,8 +48,11 @@ double decay(const std::array<Profile, 3>& profiles) {
 }
 
 // Mean free paths are of this many scene units.
-double length_of(const Medium& medium) {
-  return double{smallest_mean_free_path(medium)} / double{medium.scale};
+double length_of(std::span<const Medium> media) {
+  double length = std::numeric_limits<double>::infinity();
+  for (const Medium& medium : media)
+    length = std::min(length, double{smallest_mean_free_path(medium)} / double{medium.scale});
+  return length;
 }
 
 Medium in_units(Medium medium, float unit) {
@@ -59,20 +62,21 @@ Medium in_units(Medium medium, float unit) {
 
 }  // namespace
 
-Exitance::Exitance(const CacheGroup& group, const Medium& medium, double tolerance, Promise promise)
+Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance, Promise promise)
     : group_(group),
-      unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(length_of(medium)), -100, 100))),
+      unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(length_of(family.media)), -100, 100))),
       spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
-      kernel_(resolved_profiles(in_units(medium, unit_), spacing_)),
+      material_count_(family.wanted.size()),
       promise_(promise),
       allowance_(tolerance) {
+  make_kernels(family);
   if (group.size() == 0) return;
   const OctreeNode root = make_octree_node(0);
   const Vec3 least = Vec3(root.centre[0], root.centre[1], root.centre[2]) - Vec3(root.radius),
              size(2 * root.radius);
   // Whole blocks around all samples, and no more than 2^20 cells an axis. Cells are for receivers, too, which
   // lie closer than a mean free path only where each of them has to be certain.
-  const double length = double{unit_} * length_of(medium);
+  const double length = double{unit_} * length_of(family.media);
   cell_size_ = std::max({kCellSpacings * spacing_, promise == Promise::kCertified ? 0 : kCellLengths * length,
                          0x1p-20 * double{size.x}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
@@ -84,15 +88,23 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
   }
   // Hardly any less where that is a mean free path or more, a tenth at half of one.
   if (promise == Promise::kCalibrated)
-    own_share_ = 1 / (1 + 0.4 * std::pow(decay(make_profiles(in_units(medium, unit_))) * length, 6));
+    for (const Medium& medium : family.media)
+      own_share_ =
+          std::min(own_share_, 1 / (1 + 0.4 * std::pow(decay(make_profiles(in_units(medium, unit_))) *
+                                                           double{unit_} * length_of(std::span(&medium, 1)),
+                                                       6)));
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
   if (!(tolerance > 0)) return;
   if (promise == Promise::kCertified) {
-    const double tables = kernel_.relative_error(size.length()) + kRounding;
+    double tables = 0, jets = 0;
+    for (const Kernel& kernel : kernels_) {
+      tables = std::max(tables, kernel.relative_error(size.length()) + kRounding);
+      jets = std::max(jets, kernel.relative_error_of_jets(size.length()));
+    }
     allowance_ = tolerance - tables;
-    moment_slack_ += static_cast<float>(kernel_.relative_error_of_jets(size.length()));
+    moment_slack_ += static_cast<float>(jets);
     if (!(allowance_ > tables))
       fail(ErrorCode::kLimit, group.name,
            "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of "
@@ -100,7 +112,8 @@ Exitance::Exitance(const CacheGroup& group, const Medium& medium, double toleran
            "or --method exact",
            tolerance, tables, 2 * tables);
   }
-  if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance) kernel_.make_middles();
+  if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance)
+    for (Kernel& kernel : kernels_) kernel.make_middles();
   copy_octree();
   add_all_moments();
   make_tables();
@@ -128,6 +141,47 @@ double Exitance::lit_pieces(double radius) const {
   return fewest;
 }
 
+// Kernels, and which of them errors are held against: in each channel those of the family that are the
+// narrowest, the widest, and that fall fastest and slowest far away. What lies between them is no stricter.
+void Exitance::make_kernels(const MaterialFamily& family) {
+  std::vector<std::array<Profile, 3>> profiles;
+  for (const Medium& medium : family.media)
+    profiles.push_back(resolved_profiles(in_units(medium, unit_), spacing_));
+  for (const std::uint32_t material : family.wanted) kernels_.emplace_back(profiles[material]);
+
+  const auto width = [](const Profile& profile) { return profile.width; };
+  const auto fall = [](const Profile& profile) {
+    return std::min(profile.terms[0].sigma, profile.terms[1].sigma);
+  };
+  using Choice = std::array<std::size_t, 3>;  // a material for each channel
+  std::vector<Choice> choices;
+  const auto choose = [&](const auto& measure, double sign) {
+    Choice choice{};
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t i = 1; i < profiles.size(); ++i) {
+        const Profile &best = profiles[choice[k]][k], &other = profiles[i][k];
+        if (other.total > 0 && (!(best.total > 0) || sign * measure(other) > sign * measure(best)))
+          choice[k] = i;
+      }
+    if (std::ranges::find(choices, choice) == choices.end()) choices.push_back(choice);
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    choose(width, sign);
+    choose(fall, sign);
+  }
+  for (const Choice& choice : choices) {
+    const bool whole = choice[0] == choice[1] && choice[1] == choice[2];
+    const auto wanted = std::ranges::find(family.wanted, choice[0]);
+    Guide& guide = guides_.emplace_back();
+    guide.kernel = kernels_.size();
+    if (whole && wanted != family.wanted.end())
+      guide.kernel = static_cast<std::size_t>(wanted - family.wanted.begin());
+    else
+      kernels_.emplace_back(
+          std::array{profiles[choice[0]][0], profiles[choice[1]][1], profiles[choice[2]][2]});
+  }
+}
+
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their
 // second moments, a node errs in channel k by at most P_k (T_k (spread (rho/3 + R) + R^3/6) + S_k lean + H_k
 // tint), where S, H and T bound first, second and third derivatives: what is left out are third moments, the
@@ -135,7 +189,11 @@ double Exitance::lit_pieces(double radius) const {
 // channels. As a point, by P_k (H_k spread + S_k lean). Allowed is P_k (own K_k + share_k). Divided by P_k
 // T_k, and the least of channels taken, that leaves tables over distance against a node's own numbers.
 void Exitance::make_tables() {
-  const DistanceBins all = kernel_.bound_bins();
+  DistanceBins all = kernels_[guides_[0].kernel].bound_bins();
+  for (const Guide& guide : guides_) {
+    const DistanceBins bins = kernels_[guide.kernel].bound_bins();
+    all = {std::min(all.first, bins.first), std::max(all.last, bins.last), all.shift};
+  }
   const auto bin_of = [&](double distance) {
     const auto r2 = static_cast<float>(std::clamp(square(distance), 1e-36, 1e36));
     return std::clamp(std::bit_cast<std::int32_t>(r2) >> all.shift, all.first, all.last);
@@ -148,34 +206,40 @@ void Exitance::make_tables() {
   const auto count = static_cast<std::size_t>(bins_.last - bins_.first) + 1;
   constexpr std::size_t kVector = 64;  // floats in the longest vector there is
   const std::size_t padded = (count + kVector - 1) / kVector * kVector;
+  lean_.assign(padded, 0);
+  bend_.assign(padded, 0);
+  for (Guide& guide : guides_) make_tables(guide, count);
+}
+
+void Exitance::make_tables(Guide& guide, std::size_t count) {
+  const Kernel& kernel = kernels_[guide.kernel];
+  const OctreeNode root = make_octree_node(0);
+  const std::size_t padded = lean_.size();
+  const bool certified = promise_ == Promise::kCertified;
+  const double own = 0.5 * allowance_ * own_share_, largest = cell_size_ * (1 << kBlockLevels);
+  const double weight = (certified ? 1 : kSeriesWeight) / 6;
   const auto edge2 = [&](std::size_t bin) {
     return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
   };
-  const bool certified = promise_ == Promise::kCertified;
-  const double own = 0.5 * allowance_ * own_share_;
-  const double weight = (certified ? 1 : kSeriesWeight) / 6;
-
-  lean_.assign(padded, 0);
-  bend_.assign(padded, 0);
-  for (auto& channel : per_third_) channel.assign(padded, 0);
+  for (auto& channel : guide.per_third) channel.assign(padded, 0);
   for (std::size_t i = 0; i < count; ++i) {
-    const Kernel::Bounds& bounds = kernel_.bounds(edge2(i));
+    const Kernel::Bounds& bounds = kernel.bounds(edge2(i));
     for (int k = 0; k < 3; ++k)
       if (root.power[k] > 0) {
         const float third = std::max(bounds.third[k], 1 / kNoLimit);
-        per_third_[static_cast<std::size_t>(k)][i] = 1 / third;
+        guide.per_third[static_cast<std::size_t>(k)][i] = 1 / third;
         lean_[i] = std::max(lean_[i], std::min(bounds.slope[k] / third, kNoLimit));
         bend_[i] = std::max(bend_[i], std::min(bounds.hessian[k] / third, kNoLimit));
       }
   }
   const double smallest = cell_size_ * kSmallestRadius;
   const int radii = 1 + static_cast<int>(std::ceil(kRadiiPerOctave * std::log2(largest / smallest)));
-  radii_.resize(static_cast<std::size_t>(radii));
-  parallel_for(radii_.size(), 1, [&](std::size_t begin, std::size_t end) {
+  guide.radii.resize(static_cast<std::size_t>(radii));
+  parallel_for(guide.radii.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t j = begin; j < end; ++j) {
       const double radius = smallest * std::exp2(static_cast<double>(j) / kRadiiPerOctave);
       for (std::size_t k = 0; k < 3; ++k) {
-        auto &as_point = radii_[j].as_point[k], &in_series = radii_[j].in_series[k];
+        auto &as_point = guide.radii[j].as_point[k], &in_series = guide.radii[j].in_series[k];
         as_point.assign(padded, kNoLimit);
         in_series.assign(padded, kNoLimit);
         if (!(root.power[k] > 0)) continue;
@@ -184,16 +248,16 @@ void Exitance::make_tables() {
           // From the middle of the target to the node, or from its far side to the node's.
           const double near = std::sqrt(double{edge2(i + 1)});
           const double there = certified ? (1 + 2 * kCertifiedRatio) * near + 2 * radius : near + radius;
-          const double value = own * double{kernel_.eval(static_cast<float>(square(there)))[channel]};
-          const Kernel::Bounds& bounds = kernel_.bounds(edge2(i));
+          const double value = own * double{kernel.eval(static_cast<float>(square(there)))[channel]};
+          const Kernel::Bounds& bounds = kernel.bounds(edge2(i));
           const double bend = double{bounds.hessian[channel]}, slope = double{bounds.slope[channel]};
           double series = weight * radius * radius * radius * double{bounds.third[channel]};
           if (certified)
-            series += kernel_.relative_error_of_jets(std::sqrt(edge2(i + 1))) * radius *
+            series += kernel.relative_error_of_jets(std::sqrt(edge2(i + 1))) * radius *
                       (slope + 0.5 * bend * radius);
           const auto limit = [&](double allowed) {
             return static_cast<float>(
-                std::clamp(allowed * double{per_third_[k][i]}, -double{kNoLimit}, double{kNoLimit}));
+                std::clamp(allowed * double{guide.per_third[k][i]}, -double{kNoLimit}, double{kNoLimit}));
           };
           as_point[i] = limit(value);
           in_series[i] = limit(value - series);

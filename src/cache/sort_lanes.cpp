@@ -90,10 +90,12 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
   }
 }
 
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits) {
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits) {
   const F df;
   for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
-    VF point = hn::Set(df, 3e38f), series = point;
+    VF lean, bend, point = hn::Set(df, 3e38f), series = point;
+    if (lower)
+      hn::LoadInterleaved4(df, reinterpret_cast<const float*>(limits + i), lean, bend, point, series);
     for (std::size_t k = 0; k < 3; ++k) {
       const VF allowed =
           hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_third[k] + i));
@@ -147,8 +149,8 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH
 void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
   HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
 }
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits) {
-  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, limits);
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits) {
+  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, lower, limits);
 }
 
 }  // namespace lanes

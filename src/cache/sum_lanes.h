@@ -137,8 +137,9 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
 /// how many were added.
 std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
                            Float4& total);
-/// Limits of `count` bins for a share of the sum; whole vectors are read and written.
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, Limits* limits);
+/// Limits of `count` bins for a share of the sum, or the lower ones of these and those there are; whole
+/// vectors are read and written.
+void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits);
 
 }  // namespace lanes
 }  // namespace nacre

@@ -37,16 +37,28 @@ struct SumNode {
 /// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
 enum class Promise { kCalibrated, kCertified };
 
-/// One group of a cache seen with one material and one tolerance. M_o is a function of position and these
+/// Materials whose sums are made of the same nodes, refined for the strictest of them; and which of them are
+/// wanted, by index. M_o depends on the whole family, so that runs that share it agree, whichever they want.
+struct MaterialFamily {
+  std::vector<Medium> media;
+  std::vector<std::uint32_t> wanted{0};
+};
+
+/// One group of a cache seen with materials and one tolerance. M_o is a function of position and these
 /// alone. The cache has to outlive it.
 class Exitance {
  public:
-  /// `tolerance` is the relative error of the sum against eval_exact; 0 sums every sample. Throws
-  /// Error(kLimit) where it cannot be certified, being near the accuracy of the tables.
-  Exitance(const CacheGroup& group, const Medium& medium, double tolerance,
+  /// `tolerance` is the relative error of the sum against eval_exact, with each material; 0 sums every
+  /// sample. Throws Error(kLimit) where it cannot be certified, being near the accuracy of the tables.
+  Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance,
            Promise promise = Promise::kCalibrated);
+  Exitance(const CacheGroup& group, const Medium& medium, double tolerance,
+           Promise promise = Promise::kCalibrated)
+      : Exitance(group, MaterialFamily{{medium}}, tolerance, promise) {}
+  std::size_t material_count() const noexcept { return material_count_; }
 
-  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units. Space is divided into
+  /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units, with all materials of a
+  /// point side by side. Space is divided into
   /// blocks, those into cells, down to a few distances of samples. A node of the octree stands for its
   /// samples, and its contribution to a block or cell is a Taylor series of second order around its centre,
   /// where a bound on both errors is small against the whole sum; what is too near for a block is left to
@@ -86,6 +98,15 @@ class Exitance {
   struct Radius {
     std::array<std::vector<float>, 3> as_point, in_series;
   };
+  // A kernel that errors are held against, among the extreme ones of the family, and its tables.
+  struct Guide {
+    std::size_t kernel;                           // its index
+    std::vector<Radius> radii;                    // from the smallest cell on, kRadiiPerOctave each
+    std::array<std::vector<float>, 3> per_third;  // what a share of the sum allows, by channel
+  };
+  // The shortest and longest mean free path, the steepest and the flattest fall far away.
+  static constexpr std::size_t kMostGuides = 4;
+  using Totals = std::array<Float4, kMostGuides>;
   struct Target;
   struct Room;
 
@@ -100,15 +121,19 @@ class Exitance {
   void add_all_moments();
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                       std::span<const Moments> moments);
+  void make_kernels(const MaterialFamily& family);
   void make_tables();
+  void make_tables(Guide& guide, std::size_t count);
   bool in_grid(const Vec3& x) const noexcept;
   void sum_exactly(std::span<const Vec3> scaled_points, std::span<Rgb> exitance,
                    std::uint64_t& evaluations) const;
   void eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
                    bool whole) const;
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
-  Float4 weigh(const Target& target, Room& room) const;
-  Rgb eval_point(const Target& target, const Point& point, Room& room) const;
+  Float4 weigh(const Kernel& kernel, const Target& target, Room& room) const;
+  Totals weigh(const Target& target, Room& room) const;
+  void make_limits(const Target& target, Room& room) const;
+  void eval_point(const Target& target, const Point& point, Room& room) const;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
 
   const CacheGroup& group_;
@@ -118,7 +143,9 @@ class Exitance {
   LargeArray<SumSource> sources_;
   LargeArray<SumNode> nodes_;
   double spacing_;  // distance of samples
-  Kernel kernel_;
+  std::size_t material_count_;
+  std::vector<Kernel> kernels_;  // of the materials, then those of guides that are none of them
+  std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;
   double own_share_ = 1;        // of it, what a node's own contribution allows
@@ -126,8 +153,6 @@ class Exitance {
   Vec3d origin_{0, 0, 0};       // corner of the first cell
   double cell_size_ = 1, cells_per_unit_ = 1;
   DistanceBins bins_{};
-  std::vector<Radius> radii_;                    // from the smallest cell on, kRadiiPerOctave each
-  std::array<std::vector<float>, 3> per_third_;  // what a share of the sum allows, by channel
   std::vector<float> lean_, bend_;  // by bin, what first and second moments count against the third
 };
 

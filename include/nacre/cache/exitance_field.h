@@ -38,7 +38,8 @@ class ExitanceField {
   static double predict_nodes(std::span<const Mesh* const> meshes, double distance);
   static constexpr double kMostNodes = 20e6;
 
-  /// M_o at hits of those meshes. Adds to `evaluations` those that nodes took.
+  /// M_o at hits of those meshes, with all materials of a hit side by side. Adds to `evaluations` those that
+  /// nodes took.
   void eval(std::span<const Hit> hits, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
   /// Evaluates all nodes that are not yet known.
   void fill(std::uint64_t& evaluations) const;
@@ -89,14 +90,15 @@ class ExitanceField {
   void await_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fetch_nodes(const Part& part) const noexcept;
-  bool look_up(const Place& place, Rgb& value) const noexcept;
+  bool look_up(const Place& place, Rgb* to) const noexcept;
   void make_known(std::span<const std::uint32_t> parts, std::uint64_t& evaluations) const;
-  void set_value(std::uint32_t node, const Rgb& value) const noexcept;
+  Float4* values(std::uint32_t node) const noexcept { return values_.data() + node * materials_; }
   void judge(Part& part) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
-  Float4 interpolate(const Patch& patch, float u, float v) const noexcept;
+  Float4 interpolate(const Patch& patch, float u, float v, std::size_t m) const noexcept;
 
   const Exitance& exitance_;
+  std::size_t materials_;
   std::vector<const Mesh*> meshes_;
   float most_bend_, most_change_;
   std::vector<std::uint32_t> first_triangle_;  // by mesh
@@ -105,7 +107,7 @@ class ExitanceField {
   std::vector<Vec3> positions_;             // of nodes, block by block
   std::vector<std::uint32_t> block_of_;     // by node
   std::vector<std::uint32_t> block_begin_;  // the first node of each block, and the end
-  mutable LargeArray<Float4> values_;       // of nodes
+  mutable LargeArray<Float4> values_;       // of nodes, materials side by side
   std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_;
 };
 
