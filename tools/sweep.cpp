@@ -11,6 +11,7 @@
 #include "nacre/base/version.h"
 #include "nacre/cache/cache_file.h"
 #include "nacre/cache/fingerprint.h"
+#include "nacre/cache/material_family.h"
 #include "picture.h"
 #include "sweep_record.h"
 #include "sweep_slurm.h"
@@ -92,7 +93,17 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   return point;
 }
 
-std::string make_key(KeyValues conditions, const Point& point) {
+// Materials of all points of the plan, and what they have in common.
+struct Materials {
+  std::vector<Medium> plan;
+  MaterialFamilies sorted;
+
+  std::uint32_t family_of(const Point* point) const { return sorted.places[point->index].family; }
+};
+
+std::string make_key(KeyValues conditions, const Point& point, const Materials& materials) {
+  conditions.emplace_back("refined for",
+                          family_digest(materials.sorted.families[materials.family_of(&point)]));
   for (const Setting& setting : *point.settings)
     conditions.emplace_back(setting.key + (setting.relative ? "*" : ""), setting.value);
   for (const std::string& light : point.lights) conditions.emplace_back("light", light);
@@ -108,21 +119,18 @@ std::string describe_command(const Options& options, const Point& point) {
   return text;
 }
 
-// Renders points that share camera, lights and eta, and so everything but diffusion and single scattering.
-void render_batch(const Options& options, std::size_t medium, std::span<const Point* const> batch,
-                  const World& world, const Cache& cache, Session& session) {
+// Renders points that share camera, lights and eta, and so everything but what their materials make of it.
+void render_batch(const Options& options, std::size_t medium, const Materials& materials,
+                  std::span<const Point* const> batch, const World& world, const Cache& cache,
+                  Session& session) {
   const Scene& scene = *world.scene;
   const RenderParams params = make_render_params(options, scene, batch[0]->camera);
-  std::vector<std::vector<Medium>> variants;
-  for (const Point* const point : batch) {
-    variants.push_back(scene.media);
-    if (!variants.back().empty()) variants.back()[medium] = point->material;
-  }
+  MaterialSweep sweep{medium, materials.plan, {}};
+  for (const Point* const point : batch) sweep.wanted.push_back(static_cast<std::uint32_t>(point->index));
   const Stopwatch watch;
   Warnings warnings;
-  const Renderer renderer(world, cache, params, session.report(), variants);
-  std::vector<Image> images =
-      renderer.render_variants(params, session.progress(), session.report(), warnings);
+  const Renderer renderer(world, cache, params, session.report(), sweep);
+  std::vector<Image> images = renderer.render_sweep(params, session.progress(), session.report(), warnings);
   session.warn(warnings);
   const double share = watch.seconds() / static_cast<double>(batch.size());
   const StageTimer timer(session.report(), "write_image");
@@ -142,7 +150,7 @@ void render_batch(const Options& options, std::size_t medium, std::span<const Po
   }
 }
 
-void render_points(const Options& options, Scene& scene, std::size_t medium,
+void render_points(const Options& options, Scene& scene, std::size_t medium, const Materials& materials,
                    const std::vector<const Point*>& points, Session& session) {
   const std::vector<Medium> media = scene.media;
   const std::vector<Light> lights = scene.lights;
@@ -162,7 +170,8 @@ void render_points(const Options& options, Scene& scene, std::size_t medium,
   bool density_checked = false;
   std::optional<Cache> cache;
   const Group* last = nullptr;
-  for (const auto& [group, members] : groups) {
+  for (auto& [group, members] : groups) {
+    std::ranges::stable_sort(members, {}, [&](const Point* p) { return materials.family_of(p); });
     // Neighbouring groups mostly differ in the camera alone.
     if (!last || std::get<0>(*last) != std::get<0>(group) || std::get<1>(*last) != std::get<1>(group)) {
       scene.media = media;
@@ -189,7 +198,7 @@ void render_points(const Options& options, Scene& scene, std::size_t medium,
       density_checked = true;
     }
     for (std::size_t begin = 0; begin < members.size(); begin += together)
-      render_batch(options, medium,
+      render_batch(options, medium, materials,
                    std::span(members).subspan(begin, std::min(together, members.size() - begin)), world,
                    *cache, session);
   }
@@ -306,10 +315,13 @@ void run(const Options& options, const CLI::App& command, const std::string& com
     return result;
   }();
   std::vector<Point> points;
+  Materials materials;
   for (std::size_t i = 0; i < plan.points.size(); ++i) {
     points.push_back(make_point(options, scene, medium, i, plan.points[i]));
-    points.back().key = make_key(conditions, points.back());
+    materials.plan.push_back(points.back().material);
   }
+  materials.sorted = sort_materials(materials.plan);
+  for (Point& point : points) point.key = make_key(conditions, point, materials);
   make_folders(options.output);
 
   std::vector<const Point*> pending;
@@ -335,7 +347,7 @@ void run(const Options& options, const CLI::App& command, const std::string& com
         return session.finish();
       }
     } else {
-      render_points(options, scene, medium, pending, session);
+      render_points(options, scene, medium, materials, pending, session);
     }
   }
 

@@ -36,15 +36,11 @@ constexpr double kMiddlesTolerance = 0.005;
 
 constexpr float kNoLimit = 1e30f;
 
-// How fast a profile falls far away, per scene unit, in the channel where it does so fastest: within a mean
+// How fast a profile falls far away, per scene unit: within a mean
 // free path if light is absorbed rather than scattered. In the dark the sum is then a few nodes, whose errors
 // do not cancel.
-double decay(const std::array<Profile, 3>& profiles) {
-  double fastest = 0;
-  for (const Profile& profile : profiles)
-    if (profile.total > 0)
-      fastest = std::max(fastest, std::min(profile.terms[0].sigma, profile.terms[1].sigma));
-  return fastest;
+double decay(const Profile& profile) {
+  return profile.total > 0 ? std::min(profile.terms[0].sigma, profile.terms[1].sigma) : 0;
 }
 
 // Mean free paths are of this many scene units.
@@ -86,13 +82,6 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
     allowance_ *=
         std::clamp(most * std::sqrt(lit_pieces(length) / kManyPieces), std::min(kAlone, most), most);
   }
-  // Hardly any less where that is a mean free path or more, a tenth at half of one.
-  if (promise == Promise::kCalibrated)
-    for (const Medium& medium : family.media)
-      own_share_ =
-          std::min(own_share_, 1 / (1 + 0.4 * std::pow(decay(make_profiles(in_units(medium, unit_))) *
-                                                           double{unit_} * length_of(std::span(&medium, 1)),
-                                                       6)));
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
@@ -141,45 +130,29 @@ double Exitance::lit_pieces(double radius) const {
   return fewest;
 }
 
-// Kernels, and which of them errors are held against: in each channel those of the family that are the
-// narrowest, the widest, and that fall fastest and slowest far away. What lies between them is no stricter.
+// Kernels of the materials, and those that errors are held against.
 void Exitance::make_kernels(const MaterialFamily& family) {
-  std::vector<std::array<Profile, 3>> profiles;
-  for (const Medium& medium : family.media)
-    profiles.push_back(resolved_profiles(in_units(medium, unit_), spacing_));
-  for (const std::uint32_t material : family.wanted) kernels_.emplace_back(profiles[material]);
-
-  const auto width = [](const Profile& profile) { return profile.width; };
-  const auto fall = [](const Profile& profile) {
-    return std::min(profile.terms[0].sigma, profile.terms[1].sigma);
+  const auto profiles = [&](std::size_t i) {
+    return resolved_profiles(in_units(family.media[i], unit_), spacing_);
   };
-  using Choice = std::array<std::size_t, 3>;  // a material for each channel
-  std::vector<Choice> choices;
-  const auto choose = [&](const auto& measure, double sign) {
-    Choice choice{};
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t i = 1; i < profiles.size(); ++i) {
-        const Profile &best = profiles[choice[k]][k], &other = profiles[i][k];
-        if (other.total > 0 && (!(best.total > 0) || sign * measure(other) > sign * measure(best)))
-          choice[k] = i;
-      }
-    if (std::ranges::find(choices, choice) == choices.end()) choices.push_back(choice);
-  };
-  for (const double sign : {-1.0, 1.0}) {
-    choose(width, sign);
-    choose(fall, sign);
-  }
-  for (const Choice& choice : choices) {
-    const bool whole = choice[0] == choice[1] && choice[1] == choice[2];
-    const auto wanted = std::ranges::find(family.wanted, choice[0]);
+  for (const std::uint32_t material : family.wanted) kernels_.emplace_back(profiles(material));
+  double fastest = 0;
+  for (const ChannelChoice& choice : find_extremes(family.media)) {
     Guide& guide = guides_.emplace_back();
-    guide.kernel = kernels_.size();
-    if (whole && wanted != family.wanted.end())
+    const auto wanted = std::ranges::find(family.wanted, choice[0]);
+    if (choice[0] == choice[1] && choice[1] == choice[2] && wanted != family.wanted.end()) {
       guide.kernel = static_cast<std::size_t>(wanted - family.wanted.begin());
-    else
+    } else {
+      guide.kernel = kernels_.size();
       kernels_.emplace_back(
-          std::array{profiles[choice[0]][0], profiles[choice[1]][1], profiles[choice[2]][2]});
+          std::array{profiles(choice[0])[0], profiles(choice[1])[1], profiles(choice[2])[2]});
+    }
+    for (std::size_t k = 0; k < 3; ++k)
+      fastest = std::max(fastest, decay(make_profiles(in_units(family.media[choice[k]], unit_))[k]));
   }
+  // Hardly any less where light falls off within a mean free path or more, a tenth at half of one.
+  if (promise_ == Promise::kCalibrated)
+    own_share_ = 1 / (1 + 0.4 * std::pow(fastest * double{unit_} * length_of(family.media), 6));
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

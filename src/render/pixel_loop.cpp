@@ -35,14 +35,13 @@ class StageClock {
 
 }  // namespace
 
-PixelLoop::PixelLoop(const World& world, std::span<const std::vector<Translucency>> variants,
-                     const RenderParams& params)
+PixelLoop::PixelLoop(const World& world, std::span<const Filling> media, const RenderParams& params)
     : world_(world),
       params_(params),
       camera_(world.scene->cameras[params.camera], params.width, params.height),
       filter_(world.scene->films[params.camera]),
       light_samples_(world.scene->integrator.emitter_samples),
-      variants_(variants) {
+      media_(media) {
   const Integrator& integrator = world.scene->integrator;
   counts_mirrors_ = integrator.kind == IntegratorKind::kPath;
   depth_limit_ = !counts_mirrors_ ? 2 : integrator.max_depth < 0 ? kMaxWaves : integrator.max_depth;
@@ -135,14 +134,13 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, std::span<PixelBuffe
     if (path.sample != 0) continue;
     const SurfacePoint point = surface_point(world_, path.hit);
     const int medium = world_.shape(path.hit).medium;
-    for (std::size_t v = 0; v < pictures.size(); ++v) {
-      PixelBuffer& pixels = pictures[v];
+    for (PixelBuffer& pixels : pictures) {
       pixels.position[index] = point.position;
       pixels.normal[index] = point.shading_normal;
       pixels.depth[index] = path.hit.t;
       pixels.object_id[index] = static_cast<float>(path.hit.mesh + 1);
       if (medium == kNone || (pixels.irradiance.empty() && pixels.irradiance_error.empty())) continue;
-      const BakedLight baked = variants_[v][static_cast<std::size_t>(medium)].nearest_light(point);
+      const BakedLight baked = media_[static_cast<std::size_t>(medium)].families[0].nearest_light(point);
       if (!pixels.irradiance.empty()) pixels.irradiance[index] = baked.irradiance;
       if (!pixels.irradiance_error.empty()) pixels.irradiance_error[index] = baked.error;
     }
@@ -155,7 +153,8 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
   std::vector<const Path*> owners;
   std::vector<Hit> hits;
   std::vector<ExitPoint> points;
-  std::vector<Rgb> radiance, transmittances;
+  std::vector<Rgb> transmittances;
+  std::vector<std::vector<Rgb>> exitances;  // by family
   for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
     owners.clear();
     hits.clear();
@@ -177,32 +176,38 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
       }
       totals.shading_points += points.size();
     }
-    for (std::size_t v = 0; v < pictures.size(); ++v) {
-      const Translucency& medium = variants_[v][m];
-      const auto add = [&](Layer layer) {
-        for (std::size_t i = 0; i < owners.size(); ++i)
-          pictures[v].add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
-                          owners[i]->throughput * radiance[i]);
-      };
-      radiance.assign(points.size(), Rgb(0, 0, 0));
-      {
-        const StageClock clock(totals.diffusion);
-        std::uint64_t evaluations = 0;
-        medium.eval_diffusion(hits, points, radiance, evaluations);
-        totals.evaluations += evaluations;
+    if (points.empty()) continue;
+    const Filling& filling = media_[m];
+    exitances.resize(filling.families.size());
+    {
+      const StageClock clock(totals.diffusion);
+      std::uint64_t evaluations = 0;
+      for (std::size_t f = 0; f < exitances.size(); ++f) {
+        const Translucency& family = filling.families[f];
+        exitances[f].resize(points.size() * family.material_count());
+        family.eval_diffusion(hits, points, exitances[f], evaluations);
       }
+      totals.evaluations += evaluations;
+    }
+    for (std::size_t p = 0; p < pictures.size(); ++p) {
+      const auto [f, material] = filling.of_picture[p];
+      const Translucency& family = filling.families[f];
+      const auto add = [&](Layer layer, std::size_t i, const Rgb& radiance) {
+        pictures[p].add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
+                        owners[i]->throughput * radiance);
+      };
       {
         const StageClock clock(totals.surface);
+        const Rgb* const exitance = exitances[f].data() + material;
         for (std::size_t i = 0; i < points.size(); ++i)
-          radiance[i] *= transmittances[i] * medium.exit_factor();
-        add(Layer::kDiffusion);
+          add(Layer::kDiffusion, i,
+              exitance[i * family.material_count()] * (transmittances[i] * family.exit_factor(material)));
       }
-      if (!medium.has_single_scattering()) continue;
+      if (!family.has_single_scattering()) continue;
       const StageClock clock(totals.single);
       LostSamples lost;
       for (std::size_t i = 0; i < points.size(); ++i)
-        radiance[i] = medium.estimate_single_scattering(points[i], lost);
-      add(Layer::kSingle);
+        add(Layer::kSingle, i, family.estimate_single_scattering(material, points[i], lost));
       totals.lost[m] += lost.lost;
       totals.taken[m] += lost.taken;
     }

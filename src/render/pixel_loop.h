@@ -26,13 +26,18 @@ struct Tile {
   int x, y, width, height;
 };
 
+/// What a medium of the scene is filled with in each picture: families of materials, and where in them.
+struct Filling {
+  std::vector<Translucency> families;
+  std::vector<MaterialFamilies::Place> of_picture;  // index: which of the wanted
+};
+
 class PixelLoop {
  public:
-  /// `variants` of the scene differ in what its media are filled with, each parallel to Scene::media: they
-  /// share all rays, and what surfaces reflect. All have to outlive it.
-  PixelLoop(const World& world, std::span<const std::vector<Translucency>> variants,
-            const RenderParams& params);
-  /// Adds the samples of the pixels of a tile, to a buffer for each variant.
+  /// `media` are parallel to Scene::media. Pictures differ in what fills them: they share all rays, and what
+  /// surfaces reflect. All have to outlive it.
+  PixelLoop(const World& world, std::span<const Filling> media, const RenderParams& params);
+  /// Adds the samples of the pixels of a tile, to a buffer for each picture.
   void render_tile(const Tile& tile, std::span<PixelBuffer> pictures, Totals& totals) const;
   /// What the first sample of a pixel sees.
   Hit first_hit(std::uint32_t pixel) const;
@@ -79,7 +84,7 @@ class PixelLoop {
   int light_samples_;
   int depth_limit_, wave_limit_;
   bool counts_mirrors_;  // whether mirrored and refracted edges count towards the limit
-  std::span<const std::vector<Translucency>> variants_;
+  std::span<const Filling> media_;
 };
 
 }  // namespace nacre

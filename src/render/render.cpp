@@ -13,6 +13,7 @@ namespace nacre {
 namespace {
 
 constexpr int kPathsPerTile = 1 << 14;
+constexpr std::uint32_t kUnused = 0xffffffffu;
 
 // Pixels that are looked at, a hundred for each that is wanted, before hardly any shows a translucent
 // surface.
@@ -55,16 +56,36 @@ RenderParams default_render_params(const Scene& scene, std::size_t camera) {
 }
 
 Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report)
-    : Renderer(world, cache, params, report, std::span(&world.scene->media, 1)) {}
+    : Renderer(world, cache, params, report, MaterialSweep{world.scene->media.size(), {}, {0}}) {}
 
 Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
-                   std::span<const std::vector<Medium>> variants)
-    : world_(world) {
+                   const MaterialSweep& sweep)
+    : world_(world), pictures_(sweep.wanted.size()) {
   const StageTimer timer(report, "diffusion");  // tables of profiles, nodes on surfaces
-  for (const std::vector<Medium>& media : variants) {
-    std::vector<Translucency>& variant = variants_.emplace_back();
-    for (std::size_t m = 0; m < media.size(); ++m)
-      variant.emplace_back(world, m, media[m], m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
+  const std::vector<Medium>& media = world.scene->media;
+  for (std::size_t m = 0; m < media.size(); ++m) {
+    const CacheGroup* const group = m < cache.groups.size() ? &cache.groups[m] : nullptr;
+    Filling& filling = media_.emplace_back();
+    if (m != sweep.medium) {
+      filling.families.emplace_back(world, m, MaterialFamily{{media[m]}}, group, params);
+      filling.of_picture.resize(pictures_, {0, 0});
+      continue;
+    }
+    MaterialFamilies sorted = sort_materials(sweep.plan);
+    std::vector<std::uint32_t> used(sorted.families.size(), kUnused);  // where among the filling's
+    std::vector<const MaterialFamily*> families;
+    for (const std::uint32_t index : sweep.wanted) {
+      const auto [f, member] = sorted.places[index];
+      MaterialFamily& family = sorted.families[f];
+      if (used[f] == kUnused) {
+        used[f] = static_cast<std::uint32_t>(families.size());
+        families.push_back(&family);
+      }
+      filling.of_picture.push_back({used[f], static_cast<std::uint32_t>(family.wanted.size())});
+      family.wanted.push_back(member);
+    }
+    for (const MaterialFamily* const family : families)
+      filling.families.emplace_back(world, m, *family, group, params);
   }
 }
 Renderer::~Renderer() = default;
@@ -72,7 +93,8 @@ Renderer::~Renderer() = default;
 void Renderer::fill(Report& report) const {
   const StageTimer timer(report, "diffusion");
   std::uint64_t evaluations = 0;
-  for (const Translucency& medium : variants_[0]) medium.fill(evaluations);
+  for (const Filling& medium : media_)
+    for (const Translucency& family : medium.families) family.fill(evaluations);
   report.counts["kernel_evaluations"] += evaluations;
 }
 
@@ -80,18 +102,18 @@ void Renderer::load_exitance(const std::string& path) const {
   if (!std::filesystem::exists(path)) return;
   const std::vector<KeptExitance> file = nacre::load_exitance(path);
   std::vector<KeptExitance> own;
-  for (const Translucency& medium : variants_[0]) own.push_back(medium.keep());
+  for (const Filling& medium : media_) own.push_back(medium.families[0].keep());
   check_exitance_keys(path, file, own);
-  for (std::size_t m = 0; m < variants_[0].size(); ++m) variants_[0][m].restore(file[m]);
+  for (std::size_t m = 0; m < media_.size(); ++m) media_[m].families[0].restore(file[m]);
 }
 
 bool Renderer::save_exitance(const std::string& path) const {
   std::vector<KeptExitance> own;
   std::vector<std::vector<std::uint32_t>> block_of;
   bool any = false;
-  for (const Translucency& medium : variants_[0]) {
-    own.push_back(medium.keep());
-    block_of.push_back(medium.block_of_node());
+  for (const Filling& medium : media_) {
+    own.push_back(medium.families[0].keep());
+    block_of.push_back(medium.families[0].block_of_node());
     any = any || !own.back().key.empty();
   }
   if (any) extend_exitance(path, std::move(own), block_of);
@@ -100,7 +122,7 @@ bool Renderer::save_exitance(const std::string& path) const {
 
 std::size_t Renderer::filled_node_count() const {
   std::size_t count = 0;
-  for (const Translucency& medium : variants_[0]) count += medium.filled_node_count();
+  for (const Filling& medium : media_) count += medium.families[0].filled_node_count();
   return count;
 }
 
@@ -111,22 +133,16 @@ Image render(const World& world, const Cache& cache, const RenderParams& params,
 
 Image Renderer::render(const RenderParams& params, Progress& progress, Report& report,
                        Warnings& warnings) const {
-  return std::move(render_pictures(1, params, progress, report, warnings)[0]);
+  return std::move(render_sweep(params, progress, report, warnings)[0]);
 }
 
-std::vector<Image> Renderer::render_variants(const RenderParams& params, Progress& progress, Report& report,
-                                             Warnings& warnings) const {
-  return render_pictures(variants_.size(), params, progress, report, warnings);
-}
-
-// Of the first `count` variants.
-std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderParams& params,
-                                             Progress& progress, Report& report, Warnings& warnings) const {
-  const auto variants = std::span(variants_).first(count);
-  std::vector<PixelBuffer> pictures(count, PixelBuffer(params.crop_width, params.crop_height, params.aovs));
+std::vector<Image> Renderer::render_sweep(const RenderParams& params, Progress& progress, Report& report,
+                                          Warnings& warnings) const {
+  std::vector<PixelBuffer> pictures(pictures_,
+                                    PixelBuffer(params.crop_width, params.crop_height, params.aovs));
   Totals totals(world_.scene->media.size());
   const Stopwatch watch;
-  const PixelLoop loop(world_, variants, params);
+  const PixelLoop loop(world_, media_, params);
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
   const std::vector<Tile> tiles = make_tiles(params);
@@ -152,8 +168,12 @@ std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderPara
   report.counts["rays"] += totals.rays;
   report.counts["shading_points"] += totals.shading_points;
   report.counts["kernel_evaluations"] += totals.evaluations;
-  for (std::size_t m = 0; m < world_.scene->media.size(); ++m)
-    report.notes["diffusion of " + medium_label(*world_.scene, m)] = variants[0][m].describe_path();
+  for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
+    std::vector<std::string> paths;
+    for (const Translucency& family : media_[m].families) paths.push_back(family.describe_path());
+    report.notes["diffusion of " + medium_label(*world_.scene, m)] =
+        fmt::format("{}", fmt::join(paths, "; "));
+  }
   for (std::string& warning : describe_lost_samples(*world_.scene, totals))
     warnings.push_back(std::move(warning));
   std::vector<Image> images;
@@ -163,7 +183,7 @@ std::vector<Image> Renderer::render_pictures(std::size_t count, const RenderPara
 }
 
 Verification Renderer::verify(const RenderParams& params, int count) const {
-  const PixelLoop loop(world_, variants_, params);
+  const PixelLoop loop(world_, media_, params);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(params.crop_width) * static_cast<std::uint64_t>(params.crop_height);
   const auto wanted = static_cast<std::size_t>(count);
@@ -179,7 +199,7 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
   std::vector<Rgb> values(hits.size()), exact(hits.size());
   parallel_for(hits.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      variants_[0][static_cast<std::size_t>(world_.shape(hits[i]).medium)].eval_exitance(
+      media_[static_cast<std::size_t>(world_.shape(hits[i]).medium)].families[0].eval_exitance(
           std::span(hits).subspan(i, 1), std::span(values).subspan(i, 1), std::span(exact).subspan(i, 1));
   });
   const auto as_image = [](const std::vector<Rgb>& radiances) {

@@ -16,14 +16,12 @@ enum Purpose : std::uint64_t { kMonteCarloPoints = 11, kLambertLight, kSinglePoi
 
 }  // namespace
 
-Translucency::Translucency(const World& world, std::size_t medium, const Medium& material,
+Translucency::Translucency(const World& world, std::size_t medium, const MaterialFamily& family,
                            const CacheGroup* group, const RenderParams& params)
     : world_(world),
       medium_(medium),
-      material_(material),
-      method_(material.lambert ? Method::kLambert : params.method),
-      eta_(material.eta()),
-      exit_factor_(nacre::exit_factor(material)),
+      method_(family.media[0].lambert ? Method::kLambert : params.method),
+      eta_(family.media[0].eta()),
       bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
       light_samples_(world.scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
@@ -31,37 +29,43 @@ Translucency::Translucency(const World& world, std::size_t medium, const Medium&
       tolerance_(params.tolerance),
       certified_(params.certified),
       group_(group) {
-  const Medium& m = material_;
-  const auto profiles = make_profiles(m);
-  for (int k = 0; k < 3; ++k) total_[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
   if (uses_cache(method_)) {
     exitance_ =
-        std::make_unique<const Exitance>(*group, m, method_ == Method::kExact ? 0 : params.tolerance,
+        std::make_unique<const Exitance>(*group, family, method_ == Method::kExact ? 0 : params.tolerance,
                                          params.certified ? Promise::kCertified : Promise::kCalibrated);
     // Interpolation has no bound.
     if (method_ == Method::kHierarchical && params.tolerance > 0 && !params.certified)
-      make_field(*group, params.tolerance);
-  } else if (method_ == Method::kMonteCarlo)
-    monte_carlo_.emplace(world, medium, m, params.mc_sampling, bounces_);
-  // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
-  if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
-    single_.emplace(world, medium, m);
+      make_field(family, *group, params.tolerance);
+  }
+  for (const std::uint32_t index : family.wanted) {
+    const Medium& m = family.media[index];
+    materials_.push_back({m, nacre::exit_factor(m), Rgb(0, 0, 0), {}, {}});
+    Material& material = materials_.back();
+    const auto profiles = make_profiles(m);
+    for (int k = 0; k < 3; ++k)
+      material.total[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
+    if (method_ == Method::kMonteCarlo)
+      material.monte_carlo.emplace(world, medium, m, params.mc_sampling, bounces_);
+    // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
+    if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
+      material.single.emplace(world, medium, m);
+  }
 }
 
 // Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
 // so many mean free paths that nodes would fill the memory, pixels are fewer. On a body of a few of them M_o
 // follows the body's own shape, and where light is absorbed rather than scattered it falls faster.
-void Translucency::make_field(const CacheGroup& group, double tolerance) {
-  const Medium& m = material_;
+void Translucency::make_field(const MaterialFamily& family, const CacheGroup& group, double tolerance) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
-  const double length = double{smallest_mean_free_path(m)} / double{m.scale};
+  double length = std::numeric_limits<double>::infinity();
+  for (const Medium& m : family.media)
+    length = std::min(length, double{smallest_mean_free_path(m)} / double{m.scale});
   if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
   if (group.size() == 0) return;
   constexpr double kNodesPerRadius = 3, kAbsorbing = 0.75;
-  const Rgb alpha = reduce(m).alpha_prime;
-  const bool absorbing = std::min({alpha.x, alpha.y, alpha.z}) < 0.8f;
+  const bool absorbing = std::ranges::any_of(family.media, &absorbs_much);
   const double distance =
       std::min(ExitanceField::node_distance(tolerance) * length * (absorbing ? kAbsorbing : 1),
                double{group.nodes[0].radius} / kNodesPerRadius);
@@ -89,7 +93,7 @@ std::string Translucency::describe_path() const {
 
 // All that M_o depends on, by name.
 KeyValues Translucency::make_key() const {
-  const Medium& m = material_;
+  const Medium& m = materials_[0].medium;
   const auto triple = [](const Rgb& v) { return fmt::format("{} {} {}", v.x, v.y, v.z); };
   const std::string label = medium_label(*world_.scene, medium_);
   KeyValues key{{"samples", samples_digest(*group_)},
@@ -106,7 +110,7 @@ KeyValues Translucency::make_key() const {
 }
 
 KeptExitance Translucency::keep() const {
-  if (!field_) return {};
+  if (!field_ || materials_.size() > 1) return {};
   if (key_.empty()) key_ = make_key();
   KeptExitance kept = field_->keep();
   kept.key = key_;
@@ -126,15 +130,18 @@ void Translucency::eval_diffusion(std::span<const Hit> hits, std::span<const Exi
       exitance_->eval(positions, exitance, evaluations);
     return;
   }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ExitPoint& point = points[i];
-    if (!monte_carlo_) {
-      exitance[i] = lambert_exitance(point);
+  Rgb* to = exitance.data();
+  for (const ExitPoint& point : points) {
+    if (method_ == Method::kLambert) {
+      const Rgb irradiance = lambert_irradiance(point);
+      for (const Material& material : materials_) *to++ = material.total * irradiance;
       continue;
     }
-    exitance[i] = monte_carlo_->estimate(point.surface, mc_samples_, hash_words(point.key, kMonteCarloPoints),
+    for (const Material& material : materials_)
+      *to++ =
+          material.monte_carlo->estimate(point.surface, mc_samples_, hash_words(point.key, kMonteCarloPoints),
                                          point.sample * static_cast<std::uint32_t>(mc_samples_));
-    evaluations += static_cast<std::uint64_t>(mc_samples_);
+    evaluations += materials_.size() * static_cast<std::uint64_t>(mc_samples_);
   }
 }
 
@@ -156,18 +163,19 @@ BakedLight Translucency::nearest_light(const SurfacePoint& point) const noexcept
   return {group_->irradiance(sample), irradiance_error(*group_, sample)};
 }
 
-Rgb Translucency::lambert_exitance(const ExitPoint& point) const {
+Rgb Translucency::lambert_irradiance(const ExitPoint& point) const {
   const float side = point.surface.side(point.out);
   const Receiver receiver{point.surface.position, point.surface.shading_normal * side,
                           point.surface.origin(side), eta_, surface_albedo(world_, point.hit, true)};
-  return total_ * estimate_irradiance(world_, receiver, light_samples_, bounces_,
-                                      hash_words(point.key, kLambertLight),
-                                      point.sample * static_cast<std::uint32_t>(light_samples_));
+  return estimate_irradiance(world_, receiver, light_samples_, bounces_, hash_words(point.key, kLambertLight),
+                             point.sample * static_cast<std::uint32_t>(light_samples_));
 }
 
-Rgb Translucency::estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const {
-  return single_->estimate(point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
-                           point.sample * static_cast<std::uint32_t>(single_samples_), lost) *
+Rgb Translucency::estimate_single_scattering(std::size_t material, const ExitPoint& point,
+                                             LostSamples& lost) const {
+  return materials_[material].single->estimate(
+             point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
+             point.sample * static_cast<std::uint32_t>(single_samples_), lost) *
          surface_albedo(world_, point.hit, false);
 }
 

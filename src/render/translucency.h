@@ -1,5 +1,5 @@
-// What leaves one translucent medium at the points that rays have hit: diffusion by any method, and single
-// scattering.
+// What leaves one translucent medium at the points that rays have hit, filled with one material or several:
+// diffusion by any method, and single scattering.
 #pragma once
 
 #include <array>
@@ -33,17 +33,18 @@ struct BakedLight {
 
 class Translucency {
  public:
-  /// A medium of the scene filled with `material`, which has the eta of the scene's. `group` is read where
-  /// the method needs it, else it may be nullptr.
-  Translucency(const World& world, std::size_t medium, const Medium& material, const CacheGroup* group,
+  /// A medium of the scene filled with what is wanted of a family, which has the eta of the scene's. `group`
+  /// is read where the method needs it, else it may be nullptr.
+  Translucency(const World& world, std::size_t medium, const MaterialFamily& family, const CacheGroup* group,
                const RenderParams& params);
+  std::size_t material_count() const { return materials_.size(); }
 
-  /// Diffuse exitance M_o at points that should lie near each other; `hits` are theirs, side by side. Adds to
-  /// `evaluations` those of the profile.
+  /// Diffuse exitance M_o at points that should lie near each other, all materials of a point side by side;
+  /// `hits` are theirs. Adds to `evaluations` those of the profile.
   void eval_diffusion(std::span<const Hit> hits, std::span<const ExitPoint> points, std::span<Rgb> exitance,
                       std::uint64_t& evaluations) const;
   /// From exitance to the radiance that leaves towards the eye, its transmittance at the boundary apart.
-  float exit_factor() const { return exit_factor_; }
+  float exit_factor(std::size_t material) const { return materials_[material].exit_factor; }
   /// Evaluates diffusion on the whole surface, where it is kept.
   void fill(std::uint64_t& evaluations) const {
     if (field_) field_->fill(evaluations);
@@ -63,21 +64,26 @@ class Translucency {
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   /// What the cache's nearest sample has received; nothing without a cache.
   BakedLight nearest_light(const SurfacePoint& point) const noexcept;
-  bool has_single_scattering() const { return single_.has_value(); }
-  Rgb estimate_single_scattering(const ExitPoint& point, LostSamples& lost) const;
+  bool has_single_scattering() const { return materials_[0].single.has_value(); }
+  Rgb estimate_single_scattering(std::size_t material, const ExitPoint& point, LostSamples& lost) const;
 
  private:
-  void make_field(const CacheGroup& group, double tolerance);
+  struct Material {
+    Medium medium;
+    float exit_factor;
+    Rgb total;  // of the profile
+    std::optional<MonteCarloDiffusion> monte_carlo;
+    std::optional<SingleScattering> single;
+  };
+  void make_field(const MaterialFamily& family, const CacheGroup& group, double tolerance);
   KeyValues make_key() const;
-  Rgb lambert_exitance(const ExitPoint& point) const;
+  Rgb lambert_irradiance(const ExitPoint& point) const;
 
   const World& world_;
   std::size_t medium_;
-  Medium material_;
+  std::vector<Material> materials_;
   Method method_;
   float eta_;
-  float exit_factor_;
-  Rgb total_;  // of the profile
   int bounces_, light_samples_, single_samples_, mc_samples_;
   double tolerance_;
   bool certified_;
@@ -85,8 +91,6 @@ class Translucency {
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;
   mutable KeyValues key_;  // of what is kept, once it was asked for: all samples are hashed
-  std::optional<MonteCarloDiffusion> monte_carlo_;
-  std::optional<SingleScattering> single_;
 };
 
 }  // namespace nacre

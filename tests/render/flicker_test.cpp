@@ -110,9 +110,9 @@ TEST_F(Flicker, PointsSendTheSameToEveryCamera) {
     medium.eval_diffusion(hits, points, exitance, evaluations);
     return exitance;
   };
-  const Translucency film(world_, 0, scene_.media[0], &cache_.groups[0], params);
+  const Translucency film(world_, 0, MaterialFamily{{scene_.media[0]}}, &cache_.groups[0], params);
   const std::vector<Rgb> first = eval(film, here), second = eval(film, there);
-  const Translucency other(world_, 0, scene_.media[0], &cache_.groups[0], params);
+  const Translucency other(world_, 0, MaterialFamily{{scene_.media[0]}}, &cache_.groups[0], params);
   EXPECT_EQ(eval(other, there), second);
   EXPECT_EQ(eval(other, here), first);
   for (std::size_t i = 0; i < first.size(); ++i)

@@ -9,6 +9,7 @@
 #include "nacre/base/large_array.h"
 #include "nacre/cache/cache.h"
 #include "nacre/cache/kernel.h"
+#include "nacre/cache/material_family.h"
 #include "nacre/optics/medium.h"
 
 namespace nacre {
@@ -36,13 +37,6 @@ struct SumNode {
 
 /// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
 enum class Promise { kCalibrated, kCertified };
-
-/// Materials whose sums are made of the same nodes, refined for the strictest of them; and which of them are
-/// wanted, by index. M_o depends on the whole family, so that runs that share it agree, whichever they want.
-struct MaterialFamily {
-  std::vector<Medium> media;
-  std::vector<std::uint32_t> wanted{0};
-};
 
 /// One group of a cache seen with materials and one tolerance. M_o is a function of position and these
 /// alone. The cache has to outlive it.
@@ -104,8 +98,7 @@ class Exitance {
     std::vector<Radius> radii;                    // from the smallest cell on, kRadiiPerOctave each
     std::array<std::vector<float>, 3> per_third;  // what a share of the sum allows, by channel
   };
-  // The shortest and longest mean free path, the steepest and the flattest fall far away.
-  static constexpr std::size_t kMostGuides = 4;
+  static constexpr std::size_t kMostGuides = 4;  // that find_extremes gives
   using Totals = std::array<Float4, kMostGuides>;
   struct Target;
   struct Room;

@@ -51,7 +51,7 @@ struct RenderParams {
 /// Parameters for a camera of the scene as its film and sampler have them, without a crop.
 RenderParams default_render_params(const Scene& scene, std::size_t camera);
 
-class Translucency;
+struct Filling;
 
 /// Errors of the hierarchical diffusion against the sum over every sample, by the definitions that `nacre
 /// diff` uses for images: the worst channel counts, the largest is over points brighter than 1e-4 of the
@@ -62,6 +62,14 @@ struct Verification {
   double largest_anywhere = 0;  // of every channel however dark, which is what a certified tolerance bounds
 };
 
+/// Pictures that differ in what fills one medium of the scene: with each of the `wanted` materials of a plan.
+/// What the plan has in common is refined for the strictest of the whole, so that its parts agree.
+struct MaterialSweep {
+  std::size_t medium = 0;  // of the scene
+  std::vector<Medium> plan;
+  std::vector<std::uint32_t> wanted;  // indices into it
+};
+
 /// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is
 /// there for the next.
 class Renderer {
@@ -69,10 +77,9 @@ class Renderer {
   /// `cache` holds a group for each medium of the scene where the method uses one; world and cache have to
   /// outlive it. Of `params` it takes the method, its tolerance, samples and bounces; pictures have the same.
   Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report);
-  /// The same for several `variants` of the scene, which differ in what fills its media: each is parallel to
-  /// Scene::media and has their etas. What is kept, verified and rendered singly is the first.
+  /// The same for several materials in one of the scene's media, of its eta.
   Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
-           std::span<const std::vector<Medium>> variants);
+           const MaterialSweep& sweep);
   ~Renderer();
 
   /// Evaluates diffusion on the whole surface, so that every picture after it finds it there; nothing where
@@ -93,20 +100,19 @@ class Renderer {
   /// `single` and `specular` of translucent objects, `surface` of all others, means over the pixel's samples;
   /// R G B is their sum. Adds to `warnings` a line for each medium with samples that found no way out of it.
   Image render(const RenderParams& params, Progress& progress, Report& report, Warnings& warnings) const;
-  /// A picture of each variant, the same to the bit as by itself; rays, and what surfaces reflect, are traced
-  /// once for all of them.
-  std::vector<Image> render_variants(const RenderParams& params, Progress& progress, Report& report,
-                                     Warnings& warnings) const;
+  /// A picture of each material that is wanted: all that they have in common (rays, what surfaces reflect,
+  /// lists of nodes) is made once. Other than by itself a picture's diffusion differs within the tolerance.
+  std::vector<Image> render_sweep(const RenderParams& params, Progress& progress, Report& report,
+                                  Warnings& warnings) const;
 
   /// Measures the error of kHierarchical at what the first samples of `count` random pixels see that show a
   /// translucent surface; at fewer, perhaps none, where those are less than about one in a hundred.
   Verification verify(const RenderParams& params, int count) const;
 
  private:
-  std::vector<Image> render_pictures(std::size_t count, const RenderParams& params, Progress& progress,
-                                     Report& report, Warnings& warnings) const;
   const World& world_;
-  std::vector<std::vector<Translucency>> variants_;  // each parallel to Scene::media
+  std::size_t pictures_;
+  std::vector<Filling> media_;  // parallel to Scene::media
 };
 
 /// A single picture.

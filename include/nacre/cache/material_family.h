@@ -1,0 +1,45 @@
+// Materials whose diffusion is summed up together.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "nacre/optics/medium.h"
+
+namespace nacre {
+
+/// Materials whose sums are made of the same nodes, refined for the strictest of them; and which of them are
+/// wanted, by index. A sum depends on the family's extremes, so that runs that share it agree, whichever they
+/// want.
+struct MaterialFamily {
+  std::vector<Medium> media;
+  std::vector<std::uint32_t> wanted{0};
+};
+
+/// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
+/// eta, whether it is an opaque surface or absorbs much, and a mean free path to half an octave. Fixed
+/// intervals make a member's family independent of what else there is in others.
+struct MaterialFamilies {
+  std::vector<MaterialFamily> families;
+  struct Place {
+    std::uint32_t family, index;  // of a medium in MaterialFamily::media
+  };
+  std::vector<Place> places;  // parallel to `media`
+};
+MaterialFamilies sort_materials(std::span<const Medium> media);
+
+/// In each channel, the members that are the narrowest, the widest, and that fall fastest and slowest far
+/// away: a choice for each channel, none twice. What lies between them is no stricter.
+using ChannelChoice = std::array<std::size_t, 3>;
+std::vector<ChannelChoice> find_extremes(std::span<const Medium> media);
+
+/// True if a tenth of the light or more is absorbed at a scattering, somewhere: M_o falls faster then.
+bool absorbs_much(const Medium& medium);
+
+/// A 32-digit hash of the family's extremes.
+std::string family_digest(const MaterialFamily& family);
+
+}  // namespace nacre

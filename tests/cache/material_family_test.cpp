@@ -1,0 +1,142 @@
+// label: analytic
+// Materials whose sums are made of the same nodes: what belongs together, and that each is as right as alone.
+#include "nacre/cache/material_family.h"
+
+#include <gtest/gtest.h>
+
+#include "cache/sample_sets.h"
+#include "nacre/cache/exitance.h"
+
+namespace nacre {
+namespace {
+
+using namespace testing_support;
+
+// Of one mean free path, from hardly absorbing to where much is, in one channel or another, by factors up to
+// five; forward scattering or not.
+std::vector<Medium> make_plan(ProfileKind profile, float scale) {
+  std::vector<Medium> plan;
+  const Rgb tints[] = {{1, 1, 1}, {0.01f, 0.1f, 1}, {1, 0.05f, 0.2f}};
+  for (const Rgb& tint : tints)
+    for (const float absorption : {0.0002f, 0.01f, 0.05f, 0.15f}) {
+      Medium medium;
+      medium.profile = profile;
+      medium.scale = scale;
+      medium.g = Rgb(absorption < 0.02f ? 0.5f : 0.0f);
+      for (int k = 0; k < 3; ++k) {
+        medium.sigma_a[k] = absorption * tint[k];
+        medium.sigma_s[k] = (1.2f - medium.sigma_a[k]) / (1 - medium.g[k]);
+      }
+      plan.push_back(medium);
+    }
+  return plan;
+}
+
+Vec3 on_sphere(Rng& rng) {
+  const float z = 2 * rng.next_float() - 1, phi = 2 * kPi * rng.next_float(), s = std::sqrt(1 - z * z);
+  return {s * std::cos(phi), s * std::sin(phi), z};
+}
+
+class EveryKind : public testing::TestWithParam<ProfileKind> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind,
+                         testing::Values(ProfileKind::kDipole, ProfileKind::kBetterDipole,
+                                         ProfileKind::kNormalized));
+
+TEST_P(EveryKind, EachMemberIsWithinTheTolerance) {
+  Rgb (*const lights[])(const Vec3&, const Vec3&) = {&uniform_light, &side_light, &coloured_light,
+                                                     &spot_light};
+  for (std::size_t light = 0; light < std::size(lights); ++light)
+    for (const float scale : {40.0f, 10.0f, 2.0f}) {
+      const OwnedGroup owned = make_group(make_sphere(64, lights[light]));
+      const std::vector<Medium> plan = make_plan(GetParam(), scale);
+      const MaterialFamilies sorted = sort_materials(plan);
+      ASSERT_EQ(sorted.families.size(), 1u);
+      MaterialFamily family = sorted.families[0];
+      for (std::uint32_t m = 0; m < plan.size(); ++m) family.wanted.push_back(m);
+      std::vector<Vec3> points;
+      Rng rng(23);
+      for (int i = 0; i < 100; ++i) points.push_back(on_sphere(rng));
+      std::vector<Rgb> expected(points.size() * plan.size()), values(expected.size());
+      std::uint64_t evaluations = 0;
+      Exitance(owned.group, family, 0).eval(points, expected, evaluations);
+      for (const double tolerance : {0.1, 0.01, 0.001}) {
+        Exitance(owned.group, family, tolerance).eval(points, values, evaluations);
+        for (std::size_t m = 0; m < plan.size(); ++m)
+          for (int k = 0; k < 3; ++k) {
+            double error = 0, norm = 0;
+            for (std::size_t i = m; i < values.size(); i += plan.size()) {
+              error += square(double{values[i][k]} - double{expected[i][k]});
+              norm += square(double{expected[i][k]});
+            }
+            EXPECT_LE(std::sqrt(error), tolerance * std::sqrt(norm))
+                << "light " << light << ", scale " << scale << ", tolerance " << tolerance << ", material "
+                << m << ", channel " << k;
+          }
+      }
+    }
+}
+
+// Whichever are wanted, and as the only member the same as without a family.
+TEST_P(EveryKind, ValuesDoNotDependOnWhatIsWanted) {
+  const OwnedGroup owned = make_group(make_sphere(48, &side_light));
+  const std::vector<Medium> plan = make_plan(GetParam(), 10);
+  std::vector<Vec3> points;
+  Rng rng(29);
+  for (int i = 0; i < 40; ++i) points.push_back(on_sphere(rng));
+  const auto eval = [&](const MaterialFamily& family) {
+    std::vector<Rgb> values(points.size() * family.wanted.size());
+    std::uint64_t evaluations = 0;
+    Exitance(owned.group, family, 0.01).eval(points, values, evaluations);
+    return values;
+  };
+  const std::vector<std::uint32_t> some{7, 0, 3};
+  std::vector<std::uint32_t> all(plan.size());
+  for (std::uint32_t m = 0; m < all.size(); ++m) all[m] = m;
+  const std::vector<Rgb> of_all = eval({plan, all}), of_some = eval({plan, some});
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t j = 0; j < some.size(); ++j)
+      ASSERT_EQ(of_some[i * some.size() + j], of_all[i * all.size() + some[j]]) << i << " " << j;
+  std::vector<Rgb> alone(points.size());
+  std::uint64_t evaluations = 0;
+  Exitance(owned.group, plan[5], 0.01).eval(points, alone, evaluations);
+  EXPECT_EQ(eval({{plan[5]}, {0}}), alone);
+}
+
+TEST(MaterialFamily, BelongsTogetherWhatIsAlike) {
+  Medium medium = make_material("Marble", ProfileKind::kDipole, 1);
+  std::vector<Medium> plan{medium};
+  const auto add = [&](const auto& change) {
+    plan.push_back(medium);
+    change(plan.back());
+  };
+  add([](Medium& m) { m.sigma_a *= 1.5f; });
+  add([](Medium& m) { m.sigma_s *= 4.0f; });
+  add([](Medium& m) { m.int_ior = 1.7f; });
+  add([](Medium& m) { m.profile = ProfileKind::kNormalized; });
+  add([](Medium& m) { m.sigma_a = m.sigma_s; });
+  add([](Medium& m) { m.scale *= 3; });
+  add([](Medium&) {});
+  const MaterialFamilies sorted = sort_materials(plan);
+  EXPECT_EQ(sorted.families.size(), 6u);
+  EXPECT_EQ(sorted.families[0].media.size(), 3u);
+  EXPECT_EQ(sorted.places[7].family, 0u);
+  EXPECT_EQ(sorted.places[7].index, 2u);
+  EXPECT_TRUE(sorted.families[0].wanted.empty());
+}
+
+// What lies within a family changes nothing, what widens it does.
+TEST(MaterialFamily, IsKnownByItsExtremes) {
+  std::vector<Medium> plan = make_plan(ProfileKind::kDipole, 1);
+  const std::string digest = family_digest({plan, {}});
+  const std::size_t extremes = find_extremes(plan).size();
+  EXPECT_GE(extremes, 2u);
+  EXPECT_LE(extremes, 4u);
+  plan.insert(plan.begin() + 5, plan[1]);
+  EXPECT_EQ(family_digest({plan, {}}), digest);
+  plan.push_back(plan[3]);
+  plan.back().sigma_a *= 1.2f;
+  EXPECT_NE(family_digest({plan, {}}), digest);
+}
+
+}  // namespace
+}  // namespace nacre
