@@ -212,7 +212,8 @@ std::vector<std::string> find_words(const CLI::App& command) {
       words.push_back(name);
     else
       for (const std::string& value : option->results())
-        words.push_back(name.empty() ? value : name + (name.starts_with("--") ? "=" : "") + value);
+        words.push_back(name.empty() ? value
+                                     : fmt::format("{}{}{}", name, name.starts_with("--") ? "=" : "", value));
   }
   words.push_back("--simd=" + simd_target());
   return words;

@@ -48,7 +48,7 @@ TEST_F(CacheFile, HostileTextsAreRefused) {
   for (const auto& [kind, group] :
        std::vector<std::pair<const char*, std::uint32_t>>{{"FING", 0}, {"INFO", 0}, {"GRUP", 1}}) {
     const auto entry = entry_at(bytes, find_section(bytes, kind, group));
-    for (const std::uint64_t at : {0, 4})  // number of entries, length of the first key
+    for (const std::uint64_t at : {0u, 4u})  // number of entries, length of the first key
       for (const std::uint32_t value : {0u, 1u, 1000u, 0x7fffffffu, 0xffffffffu}) {
         Bytes changed = bytes;
         put(changed, entry.offset + at, value);

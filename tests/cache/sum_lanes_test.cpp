@@ -44,7 +44,8 @@ TEST_P(EveryTarget, SumsAListAsAPlainLoopDoes) {
   for (const ProfileKind kind :
        {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized}) {
     const Kernel kernel(resolved_profiles(make_material("Marble", kind, 3), 0.1));
-    for (const std::size_t count : {1, 3, 4, 7, 8, 15, 16, 17, 63, 64, 65, 1023, 1024, 1025, 5000}) {
+    for (const std::size_t count :
+         {1u, 3u, 4u, 7u, 8u, 15u, 16u, 17u, 63u, 64u, 65u, 1023u, 1024u, 1025u, 5000u}) {
       const std::vector<SumSource> sources = make_sources(count);
       SourceList list;
       for (const SumSource& source : sources) list.add(source);
