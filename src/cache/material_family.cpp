@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -62,6 +63,19 @@ std::vector<ChannelChoice> find_extremes(std::span<const Medium> media) {
   return choices;
 }
 
+std::array<Rgb, 2> find_extinctions(std::span<const Medium> media) {
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  std::array<Rgb, 2> range{Rgb(kInfinite), Rgb(0.0f)};
+  for (const Medium& medium : media) {
+    const Rgb sigma_t = (medium.sigma_s + medium.sigma_a) * medium.scale;
+    for (int k = 0; k < 3; ++k) {
+      range[0][k] = std::min(range[0][k], sigma_t[k]);
+      range[1][k] = std::max(range[1][k], sigma_t[k]);
+    }
+  }
+  return range;
+}
+
 std::string family_digest(const MaterialFamily& family) {
   KeyValues values;
   for (const ChannelChoice& choice : find_extremes(family.media))
@@ -72,6 +86,8 @@ std::string family_digest(const MaterialFamily& family) {
                           fmt::format("{} {} {} {} {}", reduced.sigma_s_prime[k], reduced.sigma_t_prime[k],
                                       medium.scale, medium.eta(), static_cast<int>(medium.profile)));
     }
+  for (const Rgb& sigma_t : find_extinctions(family.media))
+    values.emplace_back("sigma_t", fmt::format("{} {} {}", sigma_t.x, sigma_t.y, sigma_t.z));
   return fingerprint_digest(values);
 }
 

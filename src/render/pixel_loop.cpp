@@ -154,7 +154,6 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
   std::vector<Hit> hits;
   std::vector<ExitPoint> points;
   std::vector<Rgb> transmittances;
-  std::vector<std::vector<Rgb>> exitances;  // by family
   for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
     owners.clear();
     hits.clear();
@@ -178,7 +177,8 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
     }
     if (points.empty()) continue;
     const Filling& filling = media_[m];
-    exitances.resize(filling.families.size());
+    // By family, all materials of a point side by side.
+    std::vector<std::vector<Rgb>> exitances(filling.families.size()), scattered(filling.families.size());
     {
       const StageClock clock(totals.diffusion);
       std::uint64_t evaluations = 0;
@@ -189,6 +189,19 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
       }
       totals.evaluations += evaluations;
     }
+    for (std::size_t f = 0; f < scattered.size(); ++f) {
+      const Translucency& family = filling.families[f];
+      if (!family.has_single_scattering()) continue;
+      const StageClock clock(totals.single);
+      const std::size_t count = family.material_count();
+      scattered[f].resize(points.size() * count);
+      LostSamples lost;
+      for (std::size_t i = 0; i < points.size(); ++i)
+        family.estimate_single_scattering(points[i], lost, std::span(scattered[f]).subspan(i * count, count));
+      totals.lost[m] += lost.lost;
+      totals.taken[m] += lost.taken;
+    }
+    const StageClock clock(totals.surface);
     for (std::size_t p = 0; p < pictures.size(); ++p) {
       const auto [f, material] = filling.of_picture[p];
       const Translucency& family = filling.families[f];
@@ -196,20 +209,12 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
         pictures[p].add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
                         owners[i]->throughput * radiance);
       };
-      {
-        const StageClock clock(totals.surface);
-        const Rgb* const exitance = exitances[f].data() + material;
-        for (std::size_t i = 0; i < points.size(); ++i)
-          add(Layer::kDiffusion, i,
-              exitance[i * family.material_count()] * (transmittances[i] * family.exit_factor(material)));
-      }
-      if (!family.has_single_scattering()) continue;
-      const StageClock clock(totals.single);
-      LostSamples lost;
+      const std::size_t count = family.material_count();
       for (std::size_t i = 0; i < points.size(); ++i)
-        add(Layer::kSingle, i, family.estimate_single_scattering(material, points[i], lost));
-      totals.lost[m] += lost.lost;
-      totals.taken[m] += lost.taken;
+        add(Layer::kDiffusion, i,
+            exitances[f][i * count + material] * (transmittances[i] * family.exit_factor(material)));
+      for (std::size_t i = 0; i < points.size() && !scattered[f].empty(); ++i)
+        add(Layer::kSingle, i, scattered[f][i * count + material]);
     }
   }
 }

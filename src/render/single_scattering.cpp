@@ -1,7 +1,9 @@
 // Sampling of first-order scattering.
 #include "nacre/render/single_scattering.h"
 
+#include <algorithm>
 #include <array>
+#include <vector>
 
 #include "nacre/base/random.h"
 #include "nacre/optics/fresnel.h"
@@ -11,17 +13,18 @@
 namespace nacre {
 namespace {
 
-// Distances along the view ray, none longer than `limit`: free flights of the three channels at their own
-// rates, and at twice those, which is how light falls off that comes from in front and is attenuated on its
+// A channel's rate, its double, of the thinnest and the densest member of a family.
+constexpr std::size_t kMostRates = 12;
+
+// Distances along the view ray, none longer than `limit`: free flights at given rates, those of the three
+// channels and twice those, which is how light falls off that comes from in front and is attenuated on its
 // way in as well. All densities are combined by the balance heuristic: a sample is drawn from their mean, by
 // inverting its cumulative distribution as a whole, so that evenly spread numbers give evenly spread
 // distances.
 class FreeFlight {
  public:
-  FreeFlight(const Rgb& sigma_t, float limit) : limit_(double{limit}) {
-    for (int k = 0; k < 3; ++k)
-      for (const float factor : {1.0f, 2.0f})
-        if (sigma_t[k] > 0) add(double{sigma_t[k] * factor});
+  FreeFlight(std::span<const float> rates, float limit) : limit_(double{limit}) {
+    for (const float rate : rates) add(double{rate});
   }
   bool possible() const { return count_ > 0 && limit_ > 0; }
 
@@ -62,7 +65,7 @@ class FreeFlight {
   }
 
   double limit_;
-  std::array<double, 6> rate_{}, reach_{};  // reach: probability of a flight shorter than the limit
+  std::array<double, kMostRates> rate_{}, reach_{};  // reach: probability of a flight shorter than the limit
   std::size_t count_ = 0;
 };
 
@@ -71,8 +74,12 @@ class FreeFlight {
 struct SingleScattering::Impl {
   const World& world;
   Interior interior;
-  Rgb sigma_s, sigma_t;  // per scene unit
-  Rgb g;
+  struct Material {
+    Rgb sigma_s, sigma_t;  // per scene unit
+    Rgb g;
+  };
+  std::vector<Material> materials;
+  std::vector<float> rates;  // of free flights
   float eta;
   bool conserving;
 
@@ -92,57 +99,81 @@ struct SingleScattering::Impl {
     return true;
   }
 
-  // What reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the phase
-  // function.
-  Rgb connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample, InteriorRoom& room,
-              LostSamples& lost) const {
-    if (is_black(sample.irradiance)) return {0, 0, 0};
+  // Adds what reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the
+  // phase function.
+  void connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample, InteriorRoom& room,
+               LostSamples& lost, std::span<Rgb> arriving) const {
+    if (is_black(sample.irradiance)) return;
     const LightSegment segment = interior.trace_light(at, sample, room);
     ++lost.taken;
     lost.lost += segment.lost;
-    if (segment.blocked || is_black(segment.transmittance)) return {0, 0, 0};
-    const float cosine = dot(segment.direction, inward);
+    if (segment.blocked || is_black(segment.transmittance)) return;
+    // Light travels along -direction and on along -inward: the cosine between them is that of the two.
+    const float cosine = std::clamp(dot(segment.direction, inward), -1.0f, 1.0f);
     Rgb factor = segment.transmittance;
     if (conserving) factor *= segment.cos_entry / (eta * eta * segment.cos_refracted);
-    Rgb value;
-    for (int k = 0; k < 3; ++k)
-      // Light travels along -direction and on along -inward: the cosine between them is that of the two.
-      value[k] = sample.irradiance[k] * factor[k] * std::exp(-sigma_t[k] * segment.length) *
-                 eval_henyey_greenstein(std::clamp(cosine, -1.0f, 1.0f), g[k]);
-    return value;
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+      const Material& m = materials[i];
+      for (int k = 0; k < 3; ++k)
+        arriving[i][k] += sample.irradiance[k] * factor[k] * std::exp(-m.sigma_t[k] * segment.length) *
+                          eval_henyey_greenstein(cosine, m.g[k]);
+    }
   }
 };
 
-SingleScattering::SingleScattering(const World& world, std::size_t medium, const Medium& m) {
-  impl_ = std::make_unique<const Impl>(Impl{world, Interior(world, medium), m.sigma_s * m.scale,
-                                            (m.sigma_s + m.sigma_a) * m.scale, m.g, m.eta(),
-                                            m.convention == Convention::kConserving});
+SingleScattering::SingleScattering(const World& world, std::size_t medium, const MaterialFamily& family) {
+  const Medium& first = family.media[0];
+  Impl impl{world, Interior(world, medium), {}, {}, first.eta(), first.convention == Convention::kConserving};
+  const auto sigma_t = [](const Medium& m) { return (m.sigma_s + m.sigma_a) * m.scale; };
+  for (const std::uint32_t index : family.wanted) {
+    const Medium& m = family.media[index];
+    impl.materials.push_back({m.sigma_s * m.scale, sigma_t(m), m.g});
+  }
+  const auto [thinnest, densest] = find_extinctions(family.media);
+  for (int k = 0; k < 3; ++k)
+    for (const float factor : {1.0f, 2.0f}) {
+      if (thinnest[k] > 0) impl.rates.push_back(thinnest[k] * factor);
+      if (densest[k] > thinnest[k]) impl.rates.push_back(densest[k] * factor);
+    }
+  impl_ = std::make_unique<const Impl>(std::move(impl));
 }
 SingleScattering::~SingleScattering() = default;
 SingleScattering::SingleScattering(SingleScattering&&) noexcept = default;
 
 Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int samples, std::uint64_t key,
                                std::uint32_t first_sample, LostSamples& lost) const {
+  std::vector<Rgb> radiance(impl_->materials.size());
+  estimate(point, out, samples, key, first_sample, lost, radiance);
+  return radiance[0];
+}
+
+void SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int samples, std::uint64_t key,
+                                std::uint32_t first_sample, LostSamples& lost,
+                                std::span<Rgb> radiance) const {
   const Impl& m = *impl_;
-  Rgb sum(0, 0, 0);
+  std::ranges::fill(radiance, Rgb(0, 0, 0));
   Vec3 inward;
   float transmittance = 0;
-  if (samples <= 0 || is_black(m.sigma_s) || !m.refract_view(point, out, inward, transmittance)) return sum;
+  const auto scatters = [](const Impl::Material& material) { return !is_black(material.sigma_s); };
+  if (samples <= 0 || std::ranges::none_of(m.materials, scatters) ||
+      !m.refract_view(point, out, inward, transmittance))
+    return;
   InteriorRoom room;
   const ViewSegment view = m.interior.trace_view(point, out, inward, room);
   ++lost.taken;
   lost.lost += view.lost;
-  const FreeFlight flight(m.sigma_t, view.length);
-  if (!flight.possible()) return sum;
+  const FreeFlight flight(m.rates, view.length);
+  if (!flight.possible()) return;
 
+  std::vector<Rgb> arriving(m.materials.size());
   for (int i = 0; i < samples; ++i) {
     const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
     const Vec3 u = sobol_3d(index, key);
     const auto distance = static_cast<float>(flight.sample(double{u.x}));
     const InteriorPoint at = view.at(distance);
-    Rgb arriving(0, 0, 0);
+    std::ranges::fill(arriving, Rgb(0, 0, 0));
     const auto gather = [&](const Connection& connection) {
-      arriving += m.connect(at, inward, connection.sample, room, lost);
+      m.connect(at, inward, connection.sample, room, lost, arriving);
     };
     const std::size_t lights = m.world.scene->lights.size();
     if (lights > kMaxConnectedLights)
@@ -151,10 +182,14 @@ Rgb SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int s
       for (std::size_t light = 0; light < lights; ++light)
         gather(connect_to_light(m.world, light, at.position, kNoNormal, {u.y, u.z}, 1));
     const auto pdf = static_cast<float>(flight.pdf(double{distance}));
-    for (int k = 0; k < 3; ++k)
-      sum[k] += arriving[k] * m.sigma_s[k] * std::exp(-m.sigma_t[k] * distance) / pdf;
+    for (std::size_t j = 0; j < m.materials.size(); ++j) {
+      const Impl::Material& material = m.materials[j];
+      for (int k = 0; k < 3; ++k)
+        radiance[j][k] +=
+            arriving[j][k] * material.sigma_s[k] * std::exp(-material.sigma_t[k] * distance) / pdf;
+    }
   }
-  return sum * (transmittance / static_cast<float>(samples));
+  for (Rgb& value : radiance) value *= transmittance / static_cast<float>(samples);
 }
 
 }  // namespace nacre

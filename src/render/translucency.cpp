@@ -39,17 +39,18 @@ Translucency::Translucency(const World& world, std::size_t medium, const Materia
   }
   for (const std::uint32_t index : family.wanted) {
     const Medium& m = family.media[index];
-    materials_.push_back({m, nacre::exit_factor(m), Rgb(0, 0, 0), {}, {}});
+    materials_.push_back({m, nacre::exit_factor(m), Rgb(0, 0, 0), {}});
     Material& material = materials_.back();
     const auto profiles = make_profiles(m);
     for (int k = 0; k < 3; ++k)
       material.total[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
     if (method_ == Method::kMonteCarlo)
       material.monte_carlo.emplace(world, medium, m, params.mc_sampling, bounces_);
-    // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
-    if (single_samples_ > 0 && method_ != Method::kLambert && m.profile != ProfileKind::kNormalized)
-      material.single.emplace(world, medium, m);
   }
+  // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
+  if (single_samples_ > 0 && method_ != Method::kLambert &&
+      family.media[0].profile != ProfileKind::kNormalized)
+    single_.emplace(world, medium, family);
 }
 
 // Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
@@ -171,12 +172,12 @@ Rgb Translucency::lambert_irradiance(const ExitPoint& point) const {
                              point.sample * static_cast<std::uint32_t>(light_samples_));
 }
 
-Rgb Translucency::estimate_single_scattering(std::size_t material, const ExitPoint& point,
-                                             LostSamples& lost) const {
-  return materials_[material].single->estimate(
-             point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
-             point.sample * static_cast<std::uint32_t>(single_samples_), lost) *
-         surface_albedo(world_, point.hit, false);
+void Translucency::estimate_single_scattering(const ExitPoint& point, LostSamples& lost,
+                                              std::span<Rgb> radiance) const {
+  single_->estimate(point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
+                    point.sample * static_cast<std::uint32_t>(single_samples_), lost, radiance);
+  const Rgb albedo = surface_albedo(world_, point.hit, false);
+  for (Rgb& value : radiance) value *= albedo;
 }
 
 }  // namespace nacre

@@ -64,8 +64,9 @@ class Translucency {
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   /// What the cache's nearest sample has received; nothing without a cache.
   BakedLight nearest_light(const SurfacePoint& point) const noexcept;
-  bool has_single_scattering() const { return materials_[0].single.has_value(); }
-  Rgb estimate_single_scattering(std::size_t material, const ExitPoint& point, LostSamples& lost) const;
+  bool has_single_scattering() const { return single_.has_value(); }
+  /// For each material.
+  void estimate_single_scattering(const ExitPoint& point, LostSamples& lost, std::span<Rgb> radiance) const;
 
  private:
   struct Material {
@@ -73,7 +74,6 @@ class Translucency {
     float exit_factor;
     Rgb total;  // of the profile
     std::optional<MonteCarloDiffusion> monte_carlo;
-    std::optional<SingleScattering> single;
   };
   void make_field(const MaterialFamily& family, const CacheGroup& group, double tolerance);
   KeyValues make_key() const;
@@ -90,6 +90,7 @@ class Translucency {
   const CacheGroup* group_;
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;
+  std::optional<SingleScattering> single_;
   mutable KeyValues key_;  // of what is kept, once it was asked for: all samples are hashed
 };
 

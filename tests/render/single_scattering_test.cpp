@@ -66,6 +66,42 @@ TEST(HalfSpace, BothConventionsMeetTheirClosedForms) {
       }
 }
 
+// Materials that share points and connections are each what they are alone, thin or dense, whatever their
+// phase.
+TEST(HalfSpace, MembersOfAFamilyAreAsAlone) {
+  Scene scene;
+  Medium medium = make_test_medium();
+  add_shape(scene, placed(make_cube(), Vec3(1000, 1000, 1000), {0, 0, -1000}), kNone,
+            add_medium(scene, medium));
+  add_directional_light(scene, Vec3(-direction_at(20, 30)), {2, 3, 5});
+  const World world = make_world(scene, true);
+  const SurfacePoint point = point_at(world, Vec3(0.3f, 0.2f, 1), {0, 0, -1});
+  const Vec3 out(direction_at(50, 200));
+  MaterialFamily family;
+  for (const float density : {0.25f, 1.0f, 1.5f, 4.0f}) {
+    family.media.push_back(medium);
+    family.media.back().sigma_s *= density;
+    family.media.back().sigma_a *= 2 - std::sqrt(density) / 2;
+    family.media.back().g = Rgb(0.2f * density - 0.3f);
+  }
+  family.wanted = {2, 0, 3};
+  const SingleScattering together(world, 0, family);
+  std::vector<Vec3d> sums(3, Vec3d(0.0));
+  std::vector<Rgb> radiance(3);
+  LostSamples lost;
+  constexpr int kGroups = 64, kSamples = 1024;
+  for (int i = 0; i < kGroups; ++i) {
+    together.estimate(point, out, kSamples, hash_words(7, static_cast<std::uint64_t>(i)), 0, lost, radiance);
+    for (std::size_t j = 0; j < 3; ++j) sums[j] += Vec3d(radiance[j]);
+  }
+  for (std::size_t j = 0; j < 3; ++j) {
+    const SingleScattering alone(world, 0, family.media[family.wanted[j]]);
+    const Estimate estimate = estimate_many(alone, point, out, kGroups, kSamples);
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(sums[j][k] / kGroups / double{estimate.mean[k]}, 1, 0.005) << j << " " << k;
+  }
+}
+
 // A body as the reference integrators see it: where a line meets its boundary, and the normals there.
 struct Boundary {
   double t;

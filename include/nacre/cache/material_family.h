@@ -36,7 +36,10 @@ MaterialFamilies sort_materials(std::span<const Medium> media);
 using ChannelChoice = std::array<std::size_t, 3>;
 std::vector<ChannelChoice> find_extremes(std::span<const Medium> media);
 
-/// True if a tenth of the light or more is absorbed at a scattering, somewhere: M_o falls faster then.
+/// By channel, the least and the largest extinction coefficient sigma_t of the members, per scene unit.
+std::array<Rgb, 2> find_extinctions(std::span<const Medium> media);
+
+/// True if a fifth of the light or more is absorbed at a scattering, in some channel: M_o falls faster then.
 bool absorbs_much(const Medium& medium);
 
 /// A 32-digit hash of the family's extremes.

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
+#include "nacre/cache/material_family.h"
 #include "nacre/transport/world.h"
 
 namespace nacre {
@@ -18,17 +20,24 @@ struct LostSamples {
 /// cos(theta_i')), so that radiance is conserved at the entry.
 class SingleScattering {
  public:
-  /// Of a medium of the scene filled with `material`, whose eta is the scene's. The world has to outlive it.
-  SingleScattering(const World& world, std::size_t medium, const Medium& material);
+  /// Of a medium of the scene filled with what is wanted of a family, whose eta is the scene's. The world has
+  /// to outlive it.
+  SingleScattering(const World& world, std::size_t medium, const MaterialFamily& family);
+  SingleScattering(const World& world, std::size_t medium, const Medium& material)
+      : SingleScattering(world, medium, MaterialFamily{{material}}) {}
   ~SingleScattering();
   SingleScattering(SingleScattering&&) noexcept;
 
   /// Estimates the radiance that leaves at `point` towards `out` (unit; the side it points to counts as
   /// outside), from `samples` points along the refracted ray, each connected to every light. The points are
-  /// distributed by the mean of the three channels' free flights, cut off where the ray leaves the object.
+  /// distributed by the mean of the three channels' free flights, those of the family's thinnest and densest
+  /// members, cut off where the ray leaves the object: the same points and connections serve all materials.
   /// Not negative, finite; zero where nothing enters. `key` chooses the sequence of samples and
   /// `first_sample` where in it to begin: one sample for each of successive numbers is as good as many at
   /// once.
+  void estimate(const SurfacePoint& point, const Vec3& out, int samples, std::uint64_t key,
+                std::uint32_t first_sample, LostSamples& lost, std::span<Rgb> radiance) const;
+  /// With the first material.
   Rgb estimate(const SurfacePoint& point, const Vec3& out, int samples, std::uint64_t key,
                std::uint32_t first_sample, LostSamples& lost) const;
 
