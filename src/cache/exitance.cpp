@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cache/kernel_set.h"
 #include "cache/local_expansion.h"
 #include "cache/morton.h"
 #include "cache/sum_lanes.h"
@@ -31,10 +32,11 @@ constexpr double kPointsPerCell = 32, kSpacingsPerCell = 2;
 // A block (level kBlockLevels), a cell (level 0) or one between: what all its points share.
 struct Exitance::Target {
   Vec3 centre;
-  float radius;                     // of a ball around all its points
-  std::vector<LocalExpansion> far;  // of what is far from all of it, by material
-  Totals total;                     // about what the sum is, by guide
-  IndexList pending;                // octree nodes that its parts deal with
+  float radius;          // of a ball around all its points
+  LocalExpansion far;    // of what is far from all of it
+  SetExpansion set_far;  // the same for each material of a family
+  Totals total;          // about what the sum is, by guide
+  IndexList pending;     // octree nodes that its parts deal with
 };
 
 struct Exitance::Room {
@@ -45,6 +47,8 @@ struct Exitance::Room {
   SortedNodes nodes;
   SourceList list;
   std::vector<Limits> limits;  // of the target at hand
+  std::vector<double> totals;  // of a point
+  std::vector<float> far;
   std::uint64_t evaluations = 0;
 };
 
@@ -123,23 +127,34 @@ void Exitance::make_limits(const Target& target, Room& room) const {
 void Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
   const Vec3& x = room.points[point.index];
   Rgb* const values = &room.exitance[point.index * material_count_];
-  for (std::size_t m = 0; m < material_count_; ++m) {
-    const Float4 far = target.far[m].eval(x - target.centre);
-    std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
-    lanes::add_sources(kernels_[m].tables(), room.list, x, sum);
-    for (int k = 0; k < 3; ++k)
-      values[m][k] = static_cast<float>(std::max(sum[static_cast<std::size_t>(k)], 0.0));
-  }
   room.evaluations += material_count_ * room.list.size();
+  if (!set_) {
+    const Float4 far = target.far.eval(x - target.centre);
+    std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
+    lanes::add_sources(kernels_[0].tables(), room.list, x, sum);
+    for (std::size_t k = 0; k < 3; ++k)
+      (*values)[static_cast<int>(k)] = static_cast<float>(std::max(sum[k], 0.0));
+    return;
+  }
+  room.far.resize(set_->width());
+  target.set_far.eval(x - target.centre, room.far);
+  room.totals.assign(room.far.begin(), room.far.end());
+  lanes::add_sources(*set_, room.list, x, room.totals);
+  for (std::size_t m = 0; m < material_count_; ++m)
+    for (std::size_t k = 0; k < 3; ++k)
+      values[m][static_cast<int>(k)] = static_cast<float>(std::max(room.totals[k * set_->padded() + m], 0.0));
 }
 
 // Sums up for the points of one block or cell, which follow each other.
 void Exitance::eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const {
   Target& target = room.targets[static_cast<std::size_t>(level)];
   place(target, range, level, room);
-  target.far.resize(material_count_);
-  for (std::size_t m = 0; m < material_count_; ++m)
-    target.far[m] = parent ? parent->far[m].moved(target.centre - parent->centre) : LocalExpansion{};
+  if (!set_)
+    target.far = parent ? parent->far.moved(target.centre - parent->centre) : LocalExpansion{};
+  else if (parent)
+    target.set_far.move_from(parent->set_far, target.centre - parent->centre);
+  else
+    target.set_far.clear(set_->width());
   target.pending.clear();
   const double side = cell_size_ * static_cast<double>(1 << level) / spacing_;
   const double work = static_cast<double>(range.size()) * std::max(1.0, std::sqrt(side / kSpacingsPerCell));
@@ -197,11 +212,14 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     target.pending.append(nodes.pending.span());
   }
   if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
-  for (std::size_t m = 0; m < material_count_; ++m) {
-    const KernelTables tables = kernels_[m].tables();
-    lanes::add_series(tables, nodes_.data(), nodes.far.span(), target.centre, target.far[m]);
-    lanes::add_series(tables, sources_.data(), nodes.far_samples.span(), target.centre, target.far[m]);
-  }
+  const auto add_far = [&](const auto& kernel, auto& expansion) {
+    lanes::add_series(kernel, nodes_.data(), nodes.far.span(), target.centre, expansion);
+    lanes::add_series(kernel, sources_.data(), nodes.far_samples.span(), target.centre, expansion);
+  };
+  if (set_)
+    add_far(*set_, target.set_far);
+  else
+    add_far(kernels_[0].tables(), target.far);
   room.evaluations += material_count_ * (nodes.far.size() + nodes.far_samples.size());
 
   if (is_leaf) {
@@ -248,7 +266,7 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
   });
-  Room room{places, exitance, whole, {}, {}, {}, {}, 0};
+  Room room{places, exitance, whole, {}, {}, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)

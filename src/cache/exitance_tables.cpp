@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cache/kernel_set.h"
 #include "cache/morton.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
@@ -103,6 +104,8 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
   }
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance)
     for (Kernel& kernel : kernels_) kernel.make_middles();
+  if (family.media.size() > 1)
+    set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
   copy_octree();
   add_all_moments();
   make_tables();
@@ -129,6 +132,8 @@ double Exitance::lit_pieces(double radius) const {
     if (squares[k] > 0) fewest = std::min(fewest, square(sum[k]) / squares[k]);
   return fewest;
 }
+
+Exitance::~Exitance() = default;
 
 // Kernels of the materials, and those that errors are held against.
 void Exitance::make_kernels(const MaterialFamily& family) {

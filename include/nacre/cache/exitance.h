@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct SumNode {
   std::uint32_t sample_count() const noexcept { return packed_counts & ((1u << kChildShift) - 1); }
 };
 
+class KernelSet;
+
 /// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
 enum class Promise { kCalibrated, kCertified };
 
@@ -49,6 +52,9 @@ class Exitance {
   Exitance(const CacheGroup& group, const Medium& medium, double tolerance,
            Promise promise = Promise::kCalibrated)
       : Exitance(group, MaterialFamily{{medium}}, tolerance, promise) {}
+  ~Exitance();
+  Exitance(const Exitance&) = delete;
+  Exitance& operator=(const Exitance&) = delete;
   std::size_t material_count() const noexcept { return material_count_; }
 
   /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units, with all materials of a
@@ -137,7 +143,8 @@ class Exitance {
   LargeArray<SumNode> nodes_;
   double spacing_;  // distance of samples
   std::size_t material_count_;
-  std::vector<Kernel> kernels_;  // of the materials, then those of guides that are none of them
+  std::vector<Kernel> kernels_;           // of the materials, then those of guides that are none of them
+  std::unique_ptr<const KernelSet> set_;  // of the materials' kernels, where they are of a family
   std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;

@@ -1,0 +1,65 @@
+// The kernels of several materials side by side.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "cache/sum_lanes.h"
+#include "nacre/cache/kernel.h"
+
+namespace nacre {
+
+/// Tables of a KernelTables' layout, in which each field holds `width` floats instead of four: those of the
+/// first channel for all kernels, padded to `padded`, then the second's and the third's. A row reads the same
+/// for a kernel, whichever others there are.
+class KernelSet {
+ public:
+  /// All interpolated or none. No fewer than one.
+  explicit KernelSet(std::span<const Kernel> kernels);
+
+  std::size_t count() const noexcept { return count_; }
+  std::size_t padded() const noexcept { return padded_; }
+  std::size_t width() const noexcept { return 3 * padded_; }
+  bool interpolated() const noexcept { return interpolated_; }
+  const float* cells() const noexcept { return cells_.data(); }
+  const float* jets() const noexcept { return jets_.data(); }
+  const DistanceBins& cell_bins() const noexcept { return cell_bins_; }
+  const DistanceBins& jet_bins() const noexcept { return jet_bins_; }
+
+  /// Lanes that are processed together, of which `padded` is a multiple.
+  static constexpr std::size_t kLanes = 8;
+
+ private:
+  std::size_t count_, padded_;
+  bool interpolated_;
+  std::vector<float> cells_, jets_;
+  DistanceBins cell_bins_{}, jet_bins_{};
+};
+
+/// A LocalExpansion for each kernel of a set: its ten coefficients, each of `width` floats as the set's
+/// tables have them.
+class SetExpansion {
+ public:
+  enum Coefficient { kValue, kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kCoefficients };
+  void clear(std::size_t width) { coefficients_.assign(kCoefficients * width, 0.0f); }
+  float* data() noexcept { return coefficients_.data(); }
+  /// The same functions around another point, `by` from where they are.
+  void move_from(const SetExpansion& other, const Vec3& by);
+  /// Their values there; `values` has `width` floats.
+  void eval(const Vec3& at, std::span<float> values) const;
+
+ private:
+  std::vector<float> coefficients_;
+};
+
+namespace lanes {
+
+/// As for a single kernel; `totals` has `width` sums.
+void add_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals);
+void add_series(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
+                const Vec3& centre, SetExpansion& expansion);
+void add_series(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
+                const Vec3& centre, SetExpansion& expansion);
+
+}  // namespace lanes
+}  // namespace nacre

@@ -1,0 +1,231 @@
+// Sums and series of several kernels at once, for every vector instruction set, chosen at run time.
+#include <algorithm>
+#include <type_traits>
+
+#include "cache/kernel_set.h"
+
+#define HWY_COMPILE_ALL_ATTAINABLE  // the plain one, too
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "cache/set_lanes.cpp"
+#include <hwy/foreach_target.h>
+
+#include "cache/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace nacre::lanes::HWY_NAMESPACE {
+
+// Kernels side by side.
+using K = hn::CappedTag<float, KernelSet::kLanes>;
+using VK = hn::Vec<K>;
+
+// What one run of sources finds in a table with `kFields` fields a row.
+template <bool kInterpolated, int kFields, std::size_t kRun>
+struct SetRows {
+  static constexpr std::size_t kStep = kInterpolated ? 2 : 1;
+  const float* table;
+  std::size_t width;
+  HWY_ALIGN std::int32_t row[kRun];
+  HWY_ALIGN float fraction[kInterpolated ? kRun : 1];
+
+  HWY_INLINE SetRows(const float* first, std::size_t size) : table(first), width(size) {}
+  HWY_INLINE void find(std::size_t i, const DistanceBins& bins, VF r2) {
+    hn::Store(find_cell(bins, r2), I(), row + i);
+    if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
+  }
+  // From `lane` on.
+  HWY_INLINE VK operator()(std::size_t i, std::size_t field, std::size_t lane) const {
+    const float* const at =
+        table + (static_cast<std::size_t>(row[i]) * kFields + field) * kStep * width + lane;
+    if constexpr (kInterpolated)
+      return hn::MulAdd(hn::Set(K(), fraction[i]), hn::LoadU(K(), at + width), hn::LoadU(K(), at));
+    else
+      return hn::LoadU(K(), at);
+  }
+};
+
+HWY_INLINE void add_to(float* to, VK value) { hn::StoreU(hn::Add(hn::LoadU(K(), to), value), K(), to); }
+
+template <bool kInterpolated>
+HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec3& x,
+                         std::span<double> totals) {
+  const F df;
+  constexpr std::size_t kRun = 256;
+  const std::size_t lanes = hn::Lanes(df);
+  const VF cx = hn::Set(df, x.x), cy = hn::Set(df, x.y), cz = hn::Set(df, x.z);
+  SetRows<kInterpolated, 1, kRun> rows(set.cells(), set.width());
+  for (std::size_t begin = 0; begin < list.size(); begin += kRun) {
+    const std::size_t size = std::min(kRun, list.size() - begin);
+    for (std::size_t i = 0; i < size; i += lanes) {
+      const auto load = [&](SourceList::Field f)
+                            HWY_ATTR { return hn::LoadU(df, list.field(f) + begin + i); };
+      rows.find(i, set.cell_bins(),
+                length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
+                        hn::Sub(load(SourceList::kZ), cz)));
+    }
+    const Float4* const power = list.powers() + begin;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t v = 0; v < set.padded(); v += hn::Lanes(K())) {
+        VK even = hn::Zero(K()), odd = even;
+        std::size_t i = 0;
+        for (; i + 1 < size; i += 2) {
+          even = hn::MulAdd(hn::Set(K(), power[i][k]), rows(i, 0, k * set.padded() + v), even);
+          odd = hn::MulAdd(hn::Set(K(), power[i + 1][k]), rows(i + 1, 0, k * set.padded() + v), odd);
+        }
+        if (i < size) even = hn::MulAdd(hn::Set(K(), power[i][k]), rows(i, 0, k * set.padded() + v), even);
+        HWY_ALIGN float sums[KernelSet::kLanes];
+        hn::Store(hn::Add(even, odd), K(), sums);
+        for (std::size_t lane = 0; lane < hn::Lanes(K()); ++lane)
+          totals[k * set.padded() + v + lane] += static_cast<double>(sums[lane]);
+      }
+  }
+}
+
+void add_set_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
+  if (set.interpolated())
+    add_list<true>(set, list, x, totals);
+  else
+    add_list<false>(set, list, x, totals);
+}
+
+// What a source is weighted by, apart from kernels: its offset's monomials, and with second moments their
+// trace and twice what they stretch along the offset.
+enum Weight { kOne, kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kTrace, kStretch, kWeights };
+
+template <bool kInterpolated, class Struct>
+HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::span<const std::uint32_t> far,
+                            const Vec3& centre, float* expansion) {
+  const F df;
+  constexpr std::size_t kRun = 128;
+  constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
+  const std::size_t lanes = hn::Lanes(df), width = set.width();
+  const Float4 middle{centre.x, centre.y, centre.z, 0};
+  HWY_ALIGN Float4 offsets[kRun];
+  std::uint32_t indices[kRun + hn::MaxLanes(df)];
+  HWY_ALIGN float traces[kRun], stretches[kRun];
+  HWY_ALIGN float weights[kRun][kWeights];
+  SetRows<kInterpolated, 1, kRun> values(set.cells(), width);
+  SetRows<kInterpolated, 2, kRun> jets(set.jets(), width);
+  for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
+    const std::size_t size = std::min(kRun, far.size() - begin);
+    std::copy_n(far.data() + begin, size, indices);
+    std::fill_n(indices + size, lanes, indices[size - 1]);
+    for (std::size_t i = 0; i < size; ++i) {
+      const Struct& s = structs[indices[i]];
+      offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
+    }
+    for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
+    for (std::size_t i = 0; i < size; i += lanes) {
+      VF x, y, z, rest;
+      hn::LoadInterleaved4(df, reinterpret_cast<const float*>(offsets + i), x, y, z, rest);
+      const VF r2 = length2(x, y, z);
+      values.find(i, set.cell_bins(), r2);
+      jets.find(i, set.jet_bins(), r2);
+      if constexpr (kMoments) {
+        const auto [xx, yy, zz, yz] = load_fields(structs, indices + i, kNodeXX);
+        const auto [zx, xy, tint, spare] = load_fields(structs, indices + i, kNodeZX);
+        const VF across =
+            hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
+        const VF along =
+            hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
+        hn::Store(hn::Add(xx, hn::Add(yy, zz)), df, traces + i);
+        hn::Store(hn::MulAdd(hn::Set(df, 2), across, along), df, stretches + i);
+      }
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (std::size_t i = 0; i < size; ++i) {
+        const float power = structs[indices[i]].power[k], x = offsets[i][0], y = offsets[i][1],
+                    z = offsets[i][2];
+        const float px = power * x, py = power * y, pz = power * z;
+        float* const w = weights[i];
+        w[kOne] = power;
+        w[kX] = px;
+        w[kY] = py;
+        w[kZ] = pz;
+        w[kXX] = px * x;
+        w[kYY] = py * y;
+        w[kZZ] = pz * z;
+        w[kYZ] = py * z;
+        w[kZX] = pz * x;
+        w[kXY] = px * y;
+        w[kTrace] = kMoments ? power * traces[i] : 0;
+        w[kStretch] = kMoments ? power * stretches[i] : 0;
+      }
+      for (std::size_t v = 0; v < set.padded(); v += hn::Lanes(K())) {
+        const std::size_t lane = k * set.padded() + v;
+        // Each sum in a register of its own.
+        const VK none = hn::Zero(K());
+        VK value = none, trace = none, x = none, y = none, z = none, xx = none, yy = none, zz = none,
+           yz = none, zx = none, xy = none;
+        for (std::size_t i = 0; i < size; ++i) {
+          const float* const w = weights[i];
+          const auto weight = [&](Weight which) HWY_ATTR { return hn::Set(K(), w[which]); };
+          const VK radial = jets(i, 0, lane), bend = jets(i, 1, lane);
+          value = hn::MulAdd(weight(kOne), values(i, 0, lane), value);
+          if constexpr (kMoments)
+            value = hn::MulAdd(weight(kTrace), radial, hn::MulAdd(weight(kStretch), bend, value));
+          trace = hn::MulAdd(weight(kOne), radial, trace);
+          x = hn::MulAdd(weight(kX), radial, x);
+          y = hn::MulAdd(weight(kY), radial, y);
+          z = hn::MulAdd(weight(kZ), radial, z);
+          xx = hn::MulAdd(weight(kXX), bend, xx);
+          yy = hn::MulAdd(weight(kYY), bend, yy);
+          zz = hn::MulAdd(weight(kZZ), bend, zz);
+          yz = hn::MulAdd(weight(kYZ), bend, yz);
+          zx = hn::MulAdd(weight(kZX), bend, zx);
+          xy = hn::MulAdd(weight(kXY), bend, xy);
+        }
+        float* const to = expansion + lane;
+        add_to(to + SetExpansion::kValue * width, value);
+        add_to(to + SetExpansion::kX * width, x);
+        add_to(to + SetExpansion::kY * width, y);
+        add_to(to + SetExpansion::kZ * width, z);
+        add_to(to + SetExpansion::kXX * width, hn::Add(xx, trace));
+        add_to(to + SetExpansion::kYY * width, hn::Add(yy, trace));
+        add_to(to + SetExpansion::kZZ * width, hn::Add(zz, trace));
+        add_to(to + SetExpansion::kYZ * width, yz);
+        add_to(to + SetExpansion::kZX * width, zx);
+        add_to(to + SetExpansion::kXY * width, xy);
+      }
+    }
+  }
+}
+
+void add_set_nodes(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
+                   const Vec3& centre, float* expansion) {
+  if (set.interpolated())
+    add_structs<true>(set, nodes, far, centre, expansion);
+  else
+    add_structs<false>(set, nodes, far, centre, expansion);
+}
+void add_set_samples(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
+                     const Vec3& centre, float* expansion) {
+  if (set.interpolated())
+    add_structs<true>(set, sources, far, centre, expansion);
+  else
+    add_structs<false>(set, sources, far, centre, expansion);
+}
+
+}  // namespace nacre::lanes::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nacre::lanes {
+
+HWY_EXPORT(add_set_sources);
+HWY_EXPORT(add_set_nodes);
+HWY_EXPORT(add_set_samples);
+
+void add_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
+  HWY_DYNAMIC_DISPATCH(add_set_sources)(set, list, x, totals);
+}
+void add_series(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
+                const Vec3& centre, SetExpansion& expansion) {
+  HWY_DYNAMIC_DISPATCH(add_set_nodes)(set, nodes, far, centre, expansion.data());
+}
+void add_series(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
+                const Vec3& centre, SetExpansion& expansion) {
+  HWY_DYNAMIC_DISPATCH(add_set_samples)(set, sources, far, centre, expansion.data());
+}
+
+}  // namespace nacre::lanes
+#endif
