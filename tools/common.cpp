@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "nacre/base/file.h"
@@ -46,7 +47,21 @@ Session::Session(const CommonOptions& options, std::string command)
   if (!options_.simd.empty() && !choose_simd_target(options_.simd))
     throw UsageError(
         fmt::format("--simd {}: this processor has {}", options_.simd, fmt::join(simd_targets(), ", ")));
-  if (!options_.report_path.empty()) check_writable(options_.report_path);
+  if (!options_.report_path.empty()) {
+    check_writable(options_.report_path);
+    check_report();
+  }
+}
+
+// Replaces reports, and nothing else that may be there by now.
+void Session::check_report() const {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(options_.report_path, ignored)) return;
+  std::ifstream file(options_.report_path, std::ios::binary);
+  const int first = file.get();
+  if (file && first != '{')
+    fail(ErrorCode::kValue, options_.report_path,
+         "is there and is no report; name another file for --report, or remove it");
 }
 
 void Session::warn(const Warnings& warnings) {
@@ -55,6 +70,7 @@ void Session::warn(const Warnings& warnings) {
 
 void Session::finish() {
   if (options_.report_path.empty()) return;
+  check_report();
   nlohmann::ordered_json json;
   json["nacre"] = kVersion;
   json["command"] = command_;

@@ -42,6 +42,7 @@ class Session {
   void finish();
 
  private:
+  void check_report() const;
   CommonOptions options_;
   std::string command_;
   Stopwatch watch_;

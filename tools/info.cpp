@@ -1,5 +1,6 @@
 // nacre info: what a file holds, and whether it is sound.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "common.h"
@@ -148,7 +149,8 @@ void show_cache(const std::string& path) {
   for (const auto& [key, value] : cache.fingerprint) fmt::print("  {}: {}\n", key, value);
 }
 
-void show_image(const std::string& path) {
+// Returns whether a value is no number.
+bool show_image(const std::string& path) {
   const Image image = load_exr(path);
   fmt::print("image {}: {}x{}", path, image.full_width, image.full_height);
   if (image.width != image.full_width || image.height != image.full_height)
@@ -162,6 +164,18 @@ void show_image(const std::string& path) {
                sum / static_cast<double>(channel.values.size()), *low, *high);
   }
   for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", key, value);
+  bool flawed = false;
+  for (const Channel& channel : image.channels) {
+    const auto bad = static_cast<std::size_t>(
+        std::ranges::find_if_not(channel.values, [](float v) { return std::isfinite(v); }) -
+        channel.values.begin());
+    if (bad == channel.values.size()) continue;
+    const auto width = static_cast<std::size_t>(image.width);
+    fmt::print("  channel {} is NaN or infinite, first at pixel ({}, {})\n", channel.name,
+               image.x + static_cast<int>(bad % width), image.y + static_cast<int>(bad / width));
+    flawed = true;
+  }
+  return flawed;
 }
 
 bool show_scene(const SceneOptions& options, Session& session) {
@@ -214,7 +228,7 @@ void run(const Options& options, const std::string& command_line) {
   else if (is_cache_file(path) || extension == ".nacre")
     show_cache(path);
   else if (extension == ".exr" || extension == ".EXR")
-    show_image(path);
+    flawed = show_image(path);
   else if (is_mesh_file_name(path) && options.scene.material.empty() && !options.scene.height)
     flawed = show_mesh(path);
   else

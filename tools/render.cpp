@@ -106,7 +106,10 @@ void check_outputs(const Options& options, const std::vector<Picture>& pictures)
     check_writable(options.exitance, inputs);
     inputs.push_back(options.exitance);
   }
-  if (!options.film.contact_sheet.empty()) check_writable(options.film.contact_sheet, inputs);
+  if (!options.film.contact_sheet.empty()) {
+    check_writable(options.film.contact_sheet, inputs);
+    inputs.push_back(options.film.contact_sheet);
+  }
   for (const Picture& picture : pictures) {
     check_writable(picture.path, inputs);
     if (!options.png) continue;

@@ -172,7 +172,7 @@ SweepPlan load_plan(const std::string& path) {
     }
   } else if (path.ends_with(".csv")) {
     // An r,g,b stands in quotes.
-    const auto fields = [](const std::string& line) {
+    const auto fields = [&](const std::string& line, int number) {
       std::vector<std::string> cells(1);
       bool quoted = false;
       for (const char c : line) {
@@ -183,6 +183,7 @@ SweepPlan load_plan(const std::string& path) {
         else
           cells.back() += c;
       }
+      if (quoted) fail(ErrorCode::kSyntax, fmt::format("{}:{}", path, number), "a quote is not closed");
       for (std::string& cell : cells) cell = trimmed(cell);
       return cells;
     };
@@ -193,7 +194,7 @@ SweepPlan load_plan(const std::string& path) {
     for (const std::string& line : split(text, '\n')) {
       ++number;
       if (trimmed(line).empty() || line[0] == '#') continue;
-      const std::vector<std::string> cells = fields(line);
+      const std::vector<std::string> cells = fields(line, number);
       const std::string place = fmt::format("{}:{}", path, number);
       if (keys.empty()) {
         keys = cells;

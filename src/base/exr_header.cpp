@@ -137,6 +137,14 @@ std::int64_t lines_per_chunk(int compression, Cursor& cursor) {
   return kLines[static_cast<std::size_t>(compression)];
 }
 
+// No compression makes more of a byte than this: runs of 127, deflate's 1032 to 1 (twice over where runs come
+// first), blocks of 4 x 4 halves in 3 bytes.
+std::uint64_t most_per_byte(int compression) {
+  constexpr std::array<std::uint64_t, 10> kMost{1,        128, 1032, 1032,      16 * 1032,
+                                                2 * 1032, 16,  16,   64 * 1032, 64 * 1032};
+  return kMost[static_cast<std::size_t>(compression)];
+}
+
 std::int64_t divide_up(std::int64_t a, std::int64_t b) { return (a + b - 1) / b; }
 
 }  // namespace
@@ -164,6 +172,10 @@ void check_exr_header(std::string_view head, std::uint64_t file_bytes, const std
     fail(ErrorCode::kLimit, path,
          "{} x {} pixels with {} channels in chunks of {} x {} are more than nacre reads", width, height,
          *layout.channels, chunk_width, chunk_height);
+  // Two bytes a pixel at least.
+  if (static_cast<std::uint64_t>(width * height) * 2 > file_bytes * most_per_byte(*layout.compression))
+    fail(ErrorCode::kSyntax, path, "truncated or damaged: {} bytes cannot hold {} x {} pixels", file_bytes,
+         width, height);
   const std::int64_t chunks = divide_up(width, chunk_width) * divide_up(height, chunk_height);
   // Every chunk has an entry of eight bytes in the table behind the header.
   if (static_cast<std::uint64_t>(chunks) > file_bytes / 8)

@@ -32,6 +32,14 @@ void check_planes(const layout::SectionReader& reader, const CacheGroup& group, 
       reader.damaged(kind, index,
                      signed_plane ? "a value is not finite" : "a value is negative or not finite");
   }
+  constexpr float kFarthest = 2e15f;  // than which no scene reaches further, rounding included
+  for (std::size_t k = 0; k < static_cast<std::size_t>(Plane::kArea); ++k) {
+    const bool normal = k >= static_cast<std::size_t>(Plane::kNormalX);
+    if (!all(group.planes[k], [&](float v) { return std::abs(v) <= (normal ? 1.001f : kFarthest); }))
+      reader.damaged(
+          layout::kPlanes[k], index,
+          normal ? "a normal is longer than 1" : "a position is further away than any scene reaches");
+  }
   // Infinite power times a vanished profile would not be a number.
   const auto areas = group.plane(Plane::kArea);
   for (const Plane p : {Plane::kIrradianceR, Plane::kIrradianceG, Plane::kIrradianceB})
@@ -88,6 +96,23 @@ void check_nodes(const layout::SectionReader& reader, const CacheGroup& group, s
     return good;
   };
   if (!all(nodes, finite)) bad("a value is negative or not finite");
+  // What a node says of its samples: where they are, and what they add up to.
+  const auto bounds_samples = [&](const OctreeNode& node) {
+    if (node.child_count() > 0) return true;
+    double furthest = 0, power[3]{};
+    const Vec3d centre(node.centre[0], node.centre[1], node.centre[2]);
+    for (std::size_t i = node.first_sample; i < std::size_t{node.first_sample} + node.sample_count(); ++i) {
+      furthest = std::max(furthest, (Vec3d(group.position(i)) - centre).length());
+      const Rgb light = group.irradiance(i);
+      for (int k = 0; k < 3; ++k) power[k] += double{light[k]} * double{group.area(i)};
+    }
+    constexpr double kRounding = 1e-4;
+    bool good = furthest <= double{node.radius} + kRounding * (double{node.radius} + centre.length());
+    for (int k = 0; k < 3; ++k)
+      good &= std::abs(power[k] - double{node.power[k]}) <= kRounding * power[k] + 1e-36;
+    return good;
+  };
+  if (!all(nodes, bounds_samples)) bad("a leaf does not say what its samples are");
 }
 
 // Of a text that is nothing but a number of 0 or more; else -1.

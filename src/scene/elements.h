@@ -1,6 +1,7 @@
 // Readers of the elements of a scene, one kind of plugin each.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "nacre/scene/scene.h"
@@ -11,6 +12,7 @@ namespace nacre {
 
 /// Limit of world space, in scene units: squares of distances stay finite in single precision.
 inline constexpr double kMaxCoordinate = 1e15;
+inline constexpr double kMaxVertex = 1e9;  // squares of areas still fit a float
 
 struct MediumElement {
   Medium medium;
@@ -42,7 +44,10 @@ SensorElement read_sensor(const XmlElement& element, Warnings& warnings);
 /// <integrator>
 Integrator read_integrator(const XmlElement& element, Warnings& warnings);
 /// The mesh of a <shape> in world space: type, file and transforms, not what stands inside it.
-Mesh read_mesh(const XmlElement& element, Warnings& warnings);
+/// Is told how many triangles a subdivision will make, of how many that a file holds, and where it is asked
+/// for.
+using SubdivisionCharge = std::function<void(std::size_t made, std::size_t read, const std::string& place)>;
+Mesh read_mesh(const XmlElement& element, Warnings& warnings, const SubdivisionCharge& charge);
 /// Moves a mesh to where it belongs, as far as world space reaches. `transform_place` is that of the
 /// transform.
 void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transform_place,

@@ -71,9 +71,14 @@ Mesh make_built_in_mesh(Parameters& parameters, const std::string& type) {
       "obj, ply, stl, off, serialized, sphere, rectangle, cube, disk, cylinder, shapegroup, instance");
 }
 
-ShapeMesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
+bool is_mesh_file(std::string_view type) {
   for (const std::string_view file_type : {"obj", "ply", "stl", "off", "serialized"})
-    if (type == file_type) return load_mesh_of_type(parameters, type, warnings);
+    if (type == file_type) return true;
+  return false;
+}
+
+ShapeMesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
+  if (is_mesh_file(type)) return load_mesh_of_type(parameters, type, warnings);
   return {make_built_in_mesh(parameters, type)};
 }
 
@@ -86,13 +91,16 @@ void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transfor
   transform_mesh(mesh, to_world, transform_place);
   for (const Vec3& p : mesh.positions)
     for (int k = 0; k < 3; ++k)
-      if (!(std::abs(p[k]) < kMaxCoordinate))
-        fail(ErrorCode::kValue, place, "the shape reaches out to {:g} in world space", std::abs(p[k]));
+      if (!(std::abs(p[k]) < kMaxVertex))
+        fail(ErrorCode::kValue, place,
+             "the shape reaches out to {:g} in world space, further than {:g}: choose "
+             "larger units",
+             std::abs(p[k]), kMaxVertex);
   if (!(surface_area(mesh) > kMinArea))
     fail(ErrorCode::kValue, place, "the shape has no area in world space");
 }
 
-Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
+Mesh read_mesh(const XmlElement& element, Warnings& warnings, const SubdivisionCharge& charge) {
   Parameters parameters(element, warnings);
   auto [mesh, flat] = make_mesh(parameters, plugin_type(element), warnings);
   const Matrix4 to_world = parameters.transform("toWorld");
@@ -113,7 +121,12 @@ Mesh read_mesh(const XmlElement& element, Warnings& warnings) {
     for (Vec2& uv : mesh.uvs) uv.y = 1 - uv.y;
 
   if (closes) fill_holes(mesh, parameters.place("fillHoles"), warnings);
-  if (levels > 0) mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
+  if (levels > 0) {
+    const std::size_t count = mesh.triangles.size();
+    charge(count << 2 * levels, is_mesh_file(plugin_type(element)) ? count : 0,
+           parameters.place("subdivisions"));
+    mesh = subdivide_loop(mesh, levels, parameters.place("subdivisions"), warnings);
+  }
   place_mesh(mesh, to_world, parameters.place("toWorld"), element.place());
   if (flip) flip_normals(mesh);
   if (face_normals) {

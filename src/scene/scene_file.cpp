@@ -8,12 +8,11 @@
 #include "scene/elements.h"
 #include "scene/framing.h"
 #include "scene/parameters.h"
+#include "scene/triangle_budget.h"
 
 namespace nacre {
 namespace {
 
-constexpr std::size_t kMaxTriangles = 200'000'000;  // of all shapes together
-constexpr std::size_t kMaxShapes = 1'000'000;
 constexpr float kDefaultFov = 35;
 
 bool is_group(const XmlElement& element) {
@@ -41,7 +40,6 @@ class Builder {
   void add_sensor(const XmlElement& element);
   void add_shape(const XmlElement& element);
   void add_instance(const XmlElement& element);
-  void charge(std::size_t triangles, std::size_t shapes, const std::string& place);
   std::optional<Light> read_light_of(const XmlElement& shape, std::uint32_t index);
   Shape read_shape(const XmlElement& element, std::size_t number, bool emits);
   std::vector<Shape> read_group(const XmlElement& group);
@@ -66,7 +64,7 @@ class Builder {
   std::map<std::string, const XmlElement*> ids_;
   std::map<const XmlElement*, int> surfaces_, media_, textures_;  // those that are in the scene already
   std::map<const XmlElement*, Group> groups_;                     // those that have an instance
-  std::size_t triangles_ = 0, shapes_ = 0;                        // in memory
+  TriangleBudget budget_;
   bool has_integrator_ = false, has_sample_count_ = false;
 };
 
@@ -199,19 +197,8 @@ void Builder::add_shape(const XmlElement& element) {
     shape.light = static_cast<int>(scene_.lights.size());
     scene_.lights.push_back(std::move(*light));
   }
-  charge(shape.mesh.triangles.size(), 1, element.place());
+  budget_.charge(shape.mesh.triangles.size(), 1, element.place());
   scene_.shapes.push_back(std::move(shape));
-}
-
-// Before meshes are copied, so that instances cannot fill the memory.
-void Builder::charge(std::size_t triangles, std::size_t shapes, const std::string& place) {
-  triangles_ += triangles;
-  shapes_ += shapes;
-  if (triangles_ > kMaxTriangles)
-    fail(ErrorCode::kLimit, place, "up to here the scene has {} triangles, more than {}", triangles_,
-         kMaxTriangles);
-  if (shapes_ > kMaxShapes)
-    fail(ErrorCode::kLimit, place, "up to here the scene has {} shapes, more than {}", shapes_, kMaxShapes);
 }
 
 std::optional<Light> Builder::read_light_of(const XmlElement& shape, std::uint32_t index) {
@@ -248,7 +235,10 @@ Shape Builder::read_shape(const XmlElement& element, std::size_t number, bool em
            target.tag.starts_with('e') || target.tag.starts_with('i') ? "an" : "a", target.tag);
     }
   }
-  shape.mesh = read_mesh(element, scene_.warnings);
+  shape.mesh =
+      read_mesh(element, scene_.warnings, [&](std::size_t made, std::size_t read, const std::string& place) {
+        budget_.charge_subdivision(made, read, place);
+      });
   if (shape.surface == kNone && shape.medium == kNone)
     shape.surface = add_default_surface(shape.place, emits);
   warn_about_textures(shape);
@@ -269,7 +259,7 @@ std::vector<Shape> Builder::read_group(const XmlElement& group) {
         fail(ErrorCode::kUnsupported, child.place(),
              "instancing of emitters is not supported: move the emitting shape out of the shapegroup");
     shapes.push_back(read_shape(element, shapes.size() + 1, false));
-    charge(shapes.back().mesh.triangles.size(), 1, element.place());
+    budget_.charge(shapes.back().mesh.triangles.size(), 1, element.place());
   }
   Parameters(group, scene_.warnings).finish({"shape"});
   if (shapes.empty()) fail(ErrorCode::kSyntax, group.place(), "a shapegroup needs a <shape> inside");
@@ -294,11 +284,13 @@ void Builder::add_instance(const XmlElement& element) {
   const XmlElement& group_element = group_of(element);
   Group& group = groups_.at(&group_element);
   if (group.placed++ == 0) {
+    const std::size_t made = budget_.made();
     group.shapes = read_group(group_element);
+    budget_.charge_copies(group.instances, budget_.made() - made, element.place());
     // All instances at once, before any is there.
     std::size_t triangles = 0;
     for (const Shape& shape : group.shapes) triangles += shape.mesh.triangles.size();
-    charge(group.instances * triangles, group.instances * group.shapes.size(), element.place());
+    budget_.charge(group.instances * triangles, group.instances * group.shapes.size(), element.place());
   }
   Parameters parameters(element, scene_.warnings);
   const Matrix4 to_world = parameters.transform("toWorld");

@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 constexpr int kMaxDepth = 32;                         // of nested elements, and of nested includes
 constexpr std::size_t kMaxFileBytes = 64u << 20;      // of one scene file
 constexpr std::size_t kMaxExpandedBytes = 64u << 10;  // of one attribute in which a $name was replaced
+constexpr std::size_t kMaxFiles = 1000;               // that are included, so that those cannot either
 constexpr std::size_t kMaxTreeBytes = 256u << 20;     // of everything, so that includes cannot multiply
 
 // The attributes that an element needs and may have besides. A leaf has no children.
@@ -119,6 +120,8 @@ class Loader {
     const std::string identity = fs::weakly_canonical(path, ignored).string();
     if (std::ranges::find(open_files_, identity) != open_files_.end())
       fail(ErrorCode::kValue, included_from, "includes '{}', which is being read already: a circle", path);
+    if (++file_count_ > kMaxFiles)
+      fail(ErrorCode::kLimit, included_from, "more than {} files are included", kMaxFiles);
     if (open_files_.size() >= kMaxDepth)
       fail(ErrorCode::kLimit, included_from, "includes are nested more than {} deep", kMaxDepth);
     open_files_.push_back(identity);
@@ -178,7 +181,7 @@ class Loader {
   std::string sandbox_;
   std::set<std::string> used_;
   std::vector<std::string> open_files_;
-  std::size_t tree_bytes_ = 0;
+  std::size_t tree_bytes_ = 0, file_count_ = 0;
 };
 
 void Loader::convert(pugi::xml_node node, const Source& source, int depth, XmlElement& element) {
@@ -269,7 +272,12 @@ XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warni
 }
 
 std::string resolve_path(const std::string& name, const XmlElement& element) {
+  if (name.empty()) fail(ErrorCode::kValue, element.place(), "names no file");
   const fs::path path = fs::path(element.file).parent_path() / name;
+  std::error_code ignored;
+  if (const fs::file_status status = fs::status(path, ignored);
+      fs::exists(status) && !fs::is_regular_file(status))
+    fail(ErrorCode::kValue, element.place(), "'{}' is no regular file", excerpt(name));
   if (!element.sandbox.empty()) {
     const fs::path inside = resolve_links(fs::absolute(path)).lexically_relative(element.sandbox);
     if (inside.empty() || *inside.begin() == "..")

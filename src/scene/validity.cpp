@@ -12,6 +12,10 @@ namespace {
 constexpr float kLeastAlphaPrime = 0.5f;
 constexpr double kLeastThickness = 3;  // mean free paths
 
+// Mean free paths by which single precision may move surfaces; they are found, and light on them, only so
+// well.
+constexpr double kMostRounding = 0.02;
+
 // Surfaces that are nearer to each other than this share the density of one: about the distance of samples.
 constexpr float kNear = 0.65f;  // mean free paths
 
@@ -22,6 +26,15 @@ const std::map<PieceFault, const char*> kInShort{{PieceFault::kCopy, "copies"},
                                                  {PieceFault::kBackSide, "without thickness"},
                                                  {PieceFault::kFlat, "without thickness"},
                                                  {PieceFault::kInside, "inside others"}};
+
+double furthest_coordinate(const Scene& scene, std::size_t medium) {
+  float furthest = 0;
+  for (const Shape& shape : scene.shapes)
+    if (shape.medium == static_cast<int>(medium))
+      for (const Vec3& p : shape.mesh.positions)
+        furthest = std::max({furthest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  return double{furthest};
+}
 
 // "left lies on right (scene.xml:7)", what comes of it, and what to do.
 std::string describe(const FaultyPieces& faulty, const Shape& shape, const Shape& other) {
@@ -106,6 +119,13 @@ Warnings check_validity(const Scene& scene) {
           "{}it is {:.3g} mm thick, {:.2g} mean free paths, and diffusion wants at least {:.0f}; check "
           "`scale`",
           reasons.empty() ? "" : "; ", extent.thickness_mm, extent.thickness_mm / longest, kLeastThickness);
+    const double rounding = furthest_coordinate(scene, m) * 0x1p-24 * double{medium.scale} /
+                            double{smallest_mean_free_path(medium)};
+    if (rounding > kMostRounding)
+      reasons += fmt::format(
+          "{}it is so far from the origin that coordinates are rounded by {:.2g} mean free paths; move the "
+          "scene",
+          reasons.empty() ? "" : "; ", rounding);
     if (!reasons.empty())
       warnings.push_back(fmt::format("{}: {} ({}): {}", medium.place, medium_label(scene, m), size, reasons));
   }

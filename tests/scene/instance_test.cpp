@@ -81,11 +81,14 @@ TEST(Instances, ExplosionsAreRefused) {
       return error.what();
     }
   };
-  const std::string fine = R"(<shape type="cube"><integer name="subdivisions" value="6"/></shape>)";
+  const std::string fine = R"(<shape type="sphere"/>)";
   EXPECT_EQ(message(fine, 3), "3 shapes");
   const std::string many = message(fine, 5000);
   EXPECT_NE(many.find("scene.xml:3: up to here the scene has"), std::string::npos) << many;
   EXPECT_NE(many.find("triangles, more than 200000000"), std::string::npos) << many;
+  const std::string fission = R"(<shape type="cube"><integer name="subdivisions" value="6"/></shape>)";
+  EXPECT_EQ(message(fission, 100), "100 shapes");
+  EXPECT_NE(message(fission, 1000).find("scene.xml:3: up to here subdivisions make"), std::string::npos);
   std::string small;
   for (int i = 0; i < 2000; ++i) small += R"(<shape type="rectangle"/>)";
   EXPECT_NE(message(small, 1000).find("has 2002000 shapes, more than 1000000"), std::string::npos);
