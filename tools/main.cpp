@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <iostream>
 #include <new>
 #include <system_error>
 
@@ -78,6 +79,7 @@ int main(int argc, char** argv) {
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   const int code = run(argc, argv);
   // What was printed may still have to be written.
-  if (std::fflush(stdout) == 0 || code != 0) return code;
-  return report_output(errno);
+  errno = 0;
+  if ((std::fflush(stdout) == 0 && !std::ferror(stdout) && std::cout) || code != 0) return code;
+  return report_output(errno != 0 ? errno : EIO);
 }

@@ -2,6 +2,7 @@
 #include "nacre/base/file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <utility>
 
@@ -41,6 +43,24 @@ std::string folder_of(const std::string& path) {
 }
 
 std::string link_to(int descriptor) { return fmt::format("/proc/self/fd/{}", descriptor); }
+
+constexpr std::time_t kSurelyLocked = 60;  // seconds after which a file that is written to has its lock
+
+// Removes what processes that were killed have left beside a target: who still writes holds a lock.
+void remove_leftovers(const std::string& target) {
+  const std::string start = std::filesystem::path(target).filename().string() + ".tmp-";
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_of(target), ignored)) {
+    if (!entry.path().filename().string().starts_with(start)) continue;
+    const int descriptor = ::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (descriptor < 0) continue;
+    struct stat status;
+    if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
+        status.st_mtime + kSurelyLocked < std::time(nullptr) && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0)
+      ::unlink(entry.path().c_str());
+    ::close(descriptor);
+  }
+}
 
 }  // namespace
 
@@ -86,6 +106,7 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follo
     if (descriptor_ < 0) fail_io(path_, "write");
     return;
   }
+  remove_leftovers(target_);
   descriptor_ = ::open(folder_of(target_).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
   if (descriptor_ >= 0 && ::access(link_to(descriptor_).c_str(), F_OK) != 0) {
     ::close(descriptor_);  // no /proc: it could never get a name
@@ -94,6 +115,7 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)), target_(follo
   if (descriptor_ < 0)
     descriptor_ = make_temporary(
         [](const char* name) { return ::open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666); });
+  ::flock(descriptor_, LOCK_EX | LOCK_NB);  // where files can be locked
 }
 
 AtomicFile::~AtomicFile() {
@@ -128,9 +150,14 @@ void AtomicFile::commit() {
   }
   const int descriptor = descriptor_;
   descriptor_ = -1;
-  if (::close(descriptor) != 0) fail_io(path_, "write");
+  const int lock = ::fcntl(descriptor, F_DUPFD_CLOEXEC, 0);  // until it has its name
+  const bool closed = ::close(descriptor) == 0;
+  const bool renamed = closed && (device_ || ::rename(temporary_->path.c_str(), target_.c_str()) == 0);
+  const int error = errno;
+  if (lock >= 0) ::close(lock);
+  errno = error;
+  if (!renamed) fail_io(path_, "write");
   if (device_) return;
-  if (::rename(temporary_->path.c_str(), target_.c_str()) != 0) fail_io(path_, "write");
   temporary_.reset();
   // The rename itself has to reach the disk too; a file system that cannot sync a folder is no reason to
   // fail.

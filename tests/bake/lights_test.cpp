@@ -107,7 +107,7 @@ TEST(IrradianceError, IsRefinedToWhatIsAskedFor) {
   // At half of it, one point in fifty is so near an edge of shadow that 64 times as many samples do not do.
   constexpr double kError = 0.02;
   double before = 0, after = 0;
-  for (const std::uint64_t seed : {0, 1, 2, 3}) {
+  for (const std::uint64_t seed : {0u, 1u, 2u, 3u}) {
     params = small(seed);
     before += above(run(scene, params), kError) / 4;
     params.irradiance_error = kError;

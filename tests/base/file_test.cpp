@@ -2,10 +2,13 @@
 // Files that are there whole or not at all, and what is not a file.
 #include "nacre/base/file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -55,6 +58,24 @@ TEST_F(AtomicFileTest, PassesOverWhatIsLeftOfOthers) {
   EXPECT_EQ(read_text_file(path("a")), "new");
   for (int i = 0; i < 100; ++i) EXPECT_EQ(read_text_file(left(i)), "left");
   EXPECT_EQ(entries(), 101u);
+}
+
+// What is old and locked by nobody is of a process that was killed.
+TEST_F(AtomicFileTest, RemovesWhatTheKilledHaveLeft) {
+  const std::string left = path("a") + ".tmp-7-0", young = path("a") + ".tmp-7-1",
+                    locked = path("a") + ".tmp-7-2", other = path("ab") + ".tmp-7-0";
+  for (const std::string& name : {left, young, locked, other}) {
+    std::ofstream(name) << "left";
+    if (name != young) fs::last_write_time(name, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  }
+  const int descriptor = ::open(locked.c_str(), O_RDWR);
+  ASSERT_EQ(::flock(descriptor, LOCK_EX), 0);
+  save(path("a"), "new");
+  EXPECT_FALSE(fs::exists(left));
+  for (const std::string& name : {young, locked, other}) EXPECT_TRUE(fs::exists(name)) << name;
+  ::close(descriptor);
+  save(path("a"), "newer");
+  EXPECT_FALSE(fs::exists(locked));
 }
 
 TEST_F(AtomicFileTest, HasTheModeThatTheUserWants) {
