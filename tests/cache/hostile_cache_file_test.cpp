@@ -97,6 +97,21 @@ TEST_F(CacheFile, HostileNumbersAreRefused) {
       if (at >= 12 || value != -1.0f) refused("NODE", 64 + at, value);
 }
 
+// Sound by themselves, but further away than scenes reach, longer than directions are, not what nodes say.
+TEST_F(CacheFile, NumbersThatDisagreeAreRefused) {
+  const Bytes bytes = good();
+  const auto refused = [&](const char* kind, float value, const char* where) {
+    Bytes changed = bytes;
+    put(changed, entry_at(bytes, find_section(bytes, kind, 0)).offset + 44, value);
+    seal(changed);
+    expect_damaged(changed, where, 0, fmt::format("{} {}", kind, value));
+  };
+  for (const char* kind : {"POSX", "POSY", "POSZ"}) refused(kind, -1e38f, kind);
+  for (const char* kind : {"NRMX", "NRMY", "NRMZ"}) refused(kind, 1.5f, kind);
+  for (const char* kind : {"POSX", "POSY", "POSZ"}) refused(kind, 1e4f, "NODE");
+  for (const char* kind : {"AREA", "IRRR", "IRRG", "IRRB"}) refused(kind, 1e4f, "NODE");
+}
+
 TEST_F(CacheFile, HostileLightsAreRefused) {
   save_cache(make_golden_cache_2(), path_);
   const Bytes bytes = read_bytes(path_);

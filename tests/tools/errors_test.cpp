@@ -80,6 +80,12 @@ TEST_F(Errors, UnwritableOutput) {
   expect_refusal("bake s.xml -o .", 1, "cannot write");
 }
 
+TEST_F(Errors, ReportsReplaceReportsOnly) {
+  expect_refusal("info s.xml --report s.xml", 1, "s.xml: is there and is no report");
+  folder_.write("r.json", "{}");
+  EXPECT_EQ(run_nacre(folder_, "info s.xml --report r.json").exit_code, 0);
+}
+
 TEST_F(Errors, AbsurdScale) {
   edit("b.xml", "<float name=\"scale\" value=\"1\"/>", "<float name=\"scale\" value=\"10000\"/>");
   expect_refusal("bake b.xml -o c.nacre", 1, "scale");
