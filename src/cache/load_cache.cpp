@@ -11,6 +11,8 @@
 namespace nacre {
 namespace {
 
+constexpr float kFarthest = 2e15f;  // than which no scene reaches further, rounding included
+
 // Whether all of `values` satisfy a condition, on all cores.
 template <class T, class Condition>
 bool all(std::span<const T> values, const Condition& condition) {
@@ -32,7 +34,6 @@ void check_planes(const layout::SectionReader& reader, const CacheGroup& group, 
       reader.damaged(kind, index,
                      signed_plane ? "a value is not finite" : "a value is negative or not finite");
   }
-  constexpr float kFarthest = 2e15f;  // than which no scene reaches further, rounding included
   for (std::size_t k = 0; k < static_cast<std::size_t>(Plane::kArea); ++k) {
     const bool normal = k >= static_cast<std::size_t>(Plane::kNormalX);
     if (!all(group.planes[k], [&](float v) { return std::abs(v) <= (normal ? 1.001f : kFarthest); }))
@@ -87,21 +88,23 @@ void check_nodes(const layout::SectionReader& reader, const CacheGroup& group, s
   }
   if (next_child != nodes.size()) bad("nodes are left over");
   const auto finite = [](const OctreeNode& node) {
-    bool good = std::isfinite(node.radius) && node.radius >= 0;
+    bool good = node.radius >= 0 && node.radius <= 4 * kFarthest;
     for (int k = 0; k < 3; ++k) {
-      good &= std::isfinite(node.centre[k]);
+      good &= std::abs(node.centre[k]) <= kFarthest;
       for (const float v : {node.power[k], node.second_moment[k], node.first_moment[k]})
         good &= std::isfinite(v) && v >= 0;
     }
     return good;
   };
-  if (!all(nodes, finite)) bad("a value is negative or not finite");
-  // What a node says of its samples: where they are, and what they add up to.
-  const auto bounds_samples = [&](const OctreeNode& node) {
-    if (node.child_count() > 0) return true;
+  if (!all(nodes, finite)) bad("a value is negative, not finite or further away than any scene reaches");
+  // What a leaf says of its samples, where they are and what they add up to, and any other of its children.
+  const auto is_sum = [&](const OctreeNode& node) {
     double furthest = 0, power[3]{};
     const Vec3d centre(node.centre[0], node.centre[1], node.centre[2]);
-    for (std::size_t i = node.first_sample; i < std::size_t{node.first_sample} + node.sample_count(); ++i) {
+    for (std::uint32_t c = 0; c < node.child_count(); ++c)
+      for (int k = 0; k < 3; ++k) power[k] += double{nodes[node.first_child + c].power[k]};
+    const std::size_t first = node.first_sample, count = node.child_count() > 0 ? 0 : node.sample_count();
+    for (std::size_t i = first; i < first + count; ++i) {
       furthest = std::max(furthest, (Vec3d(group.position(i)) - centre).length());
       const Rgb light = group.irradiance(i);
       for (int k = 0; k < 3; ++k) power[k] += double{light[k]} * double{group.area(i)};
@@ -112,7 +115,7 @@ void check_nodes(const layout::SectionReader& reader, const CacheGroup& group, s
       good &= std::abs(power[k] - double{node.power[k]}) <= kRounding * power[k] + 1e-36;
     return good;
   };
-  if (!all(nodes, bounds_samples)) bad("a leaf does not say what its samples are");
+  if (!all(nodes, is_sum)) bad("a node does not say what is below it");
 }
 
 // Of a text that is nothing but a number of 0 or more; else -1.
