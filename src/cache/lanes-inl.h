@@ -176,6 +176,35 @@ enum NodeField {
 enum SourceField { kSourceX, kSourceY, kSourceZ };
 enum LimitField { kLean, kBend, kAsPoint, kInSeries };
 
+// A run of sources that a series takes in: their indices and offsets from its centre, padded to whole
+// vectors.
+template <class Struct>
+HWY_INLINE void find_offsets(const Struct* structs, std::span<const std::uint32_t> run, const Vec3& centre,
+                             std::uint32_t* indices, Float4* offsets) {
+  const std::size_t size = run.size(), lanes = hn::Lanes(F());
+  const Float4 middle{centre.x, centre.y, centre.z, 0};
+  std::copy_n(run.data(), size, indices);
+  std::fill_n(indices + size, lanes, indices[size - 1]);
+  for (std::size_t i = 0; i < size; ++i) {
+    const Struct& s = structs[indices[i]];
+    offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
+  }
+  for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
+}
+
+// Second moments of nodes as seen along (x, y, z): their trace, and twice what they stretch along it.
+struct SeenMoments {
+  VF trace, stretch;
+};
+HWY_INLINE SeenMoments find_moments(const SumNode* nodes, const std::uint32_t* indices, VF x, VF y, VF z) {
+  const F df;
+  const auto [xx, yy, zz, yz] = load_fields(nodes, indices, kNodeXX);
+  const auto [zx, xy, tint, spare] = load_fields(nodes, indices, kNodeZX);
+  const VF across = hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
+  const VF along = hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
+  return {hn::Add(xx, hn::Add(yy, zz)), hn::MulAdd(hn::Set(df, 2), across, along)};
+}
+
 // Stores the lanes of `mask` side by side, and as many more as a vector has; gives their number.
 #if HWY_TARGET == HWY_AVX2
 // Highway's own goes through a table that GCC 12 copies to the stack each time.

@@ -98,7 +98,6 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
   constexpr std::size_t kRun = 128;
   constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
   const std::size_t lanes = hn::Lanes(df), width = set.width();
-  const Float4 middle{centre.x, centre.y, centre.z, 0};
   HWY_ALIGN Float4 offsets[kRun];
   std::uint32_t indices[kRun + hn::MaxLanes(df)];
   HWY_ALIGN float traces[kRun], stretches[kRun];
@@ -107,13 +106,7 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
   SetRows<kInterpolated, 2, kRun> jets(set.jets(), width);
   for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
     const std::size_t size = std::min(kRun, far.size() - begin);
-    std::copy_n(far.data() + begin, size, indices);
-    std::fill_n(indices + size, lanes, indices[size - 1]);
-    for (std::size_t i = 0; i < size; ++i) {
-      const Struct& s = structs[indices[i]];
-      offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
-    }
-    for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
+    find_offsets(structs, far.subspan(begin, size), centre, indices, offsets);
     for (std::size_t i = 0; i < size; i += lanes) {
       VF x, y, z, rest;
       hn::LoadInterleaved4(df, reinterpret_cast<const float*>(offsets + i), x, y, z, rest);
@@ -121,14 +114,9 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
       values.find(i, set.cell_bins(), r2);
       jets.find(i, set.jet_bins(), r2);
       if constexpr (kMoments) {
-        const auto [xx, yy, zz, yz] = load_fields(structs, indices + i, kNodeXX);
-        const auto [zx, xy, tint, spare] = load_fields(structs, indices + i, kNodeZX);
-        const VF across =
-            hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
-        const VF along =
-            hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
-        hn::Store(hn::Add(xx, hn::Add(yy, zz)), df, traces + i);
-        hn::Store(hn::MulAdd(hn::Set(df, 2), across, along), df, stretches + i);
+        const auto [trace, stretch] = find_moments(structs, indices + i, x, y, z);
+        hn::Store(trace, df, traces + i);
+        hn::Store(stretch, df, stretches + i);
       }
     }
     for (std::size_t k = 0; k < 3; ++k) {

@@ -87,7 +87,6 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
                             LocalExpansion& expansion) {
   const F df;
   constexpr std::size_t kRun = 128;
-  const Float4 middle{centre.x, centre.y, centre.z, 0};
   HWY_ALIGN Float4 offsets[kRun];
   std::uint32_t indices[kRun + hn::MaxLanes(df)];
   // Second moments of nodes: their trace, and twice what they stretch along the offset.
@@ -97,13 +96,7 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
   Rows<kInterpolated, 2, kRun> jets(kernel.jets);
   for (std::size_t begin = 0; begin < far.size(); begin += kRun) {
     const std::size_t size = std::min(kRun, far.size() - begin), lanes = hn::Lanes(df);
-    std::copy_n(far.data() + begin, size, indices);
-    std::fill_n(indices + size, hn::Lanes(df), indices[size - 1]);
-    for (std::size_t i = 0; i < size; ++i) {
-      const Struct& s = structs[indices[i]];
-      offsets[i] = middle - Float4{s.x, s.y, s.z, 0};
-    }
-    for (std::size_t i = size; i % lanes != 0; ++i) offsets[i] = offsets[size - 1];
+    find_offsets(structs, far.subspan(begin, size), centre, indices, offsets);
     for (std::size_t i = 0; i < size; i += lanes) {
       VF x, y, z, rest;
       hn::LoadInterleaved4(df, reinterpret_cast<const float*>(offsets + i), x, y, z, rest);
@@ -111,13 +104,7 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
       values.find(i, kernel.cell_bins, r2);
       jets.find(i, kernel.jet_bins, r2);
       if constexpr (kMoments) {
-        const auto [xx, yy, zz, yz] = load_fields(structs, indices + i, kNodeXX);
-        const auto [zx, xy, tint, spare] = load_fields(structs, indices + i, kNodeZX);
-        const VF across =
-            hn::MulAdd(hn::Mul(x, y), xy, hn::MulAdd(hn::Mul(y, z), yz, hn::Mul(hn::Mul(z, x), zx)));
-        const VF along =
-            hn::MulAdd(hn::Mul(x, x), xx, hn::MulAdd(hn::Mul(y, y), yy, hn::Mul(hn::Mul(z, z), zz)));
-        const VF trace = hn::Add(xx, hn::Add(yy, zz)), stretch = hn::MulAdd(hn::Set(df, 2), across, along);
+        const auto [trace, stretch] = find_moments(structs, indices + i, x, y, z);
         hn::StoreInterleaved4(trace, stretch, trace, stretch, df, reinterpret_cast<float*>(moments + i));
       }
     }
