@@ -1,6 +1,5 @@
 // nacre info: what a file holds, and whether it is sound.
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 #include "common.h"
@@ -166,13 +165,9 @@ bool show_image(const std::string& path) {
   for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", key, value);
   bool flawed = false;
   for (const Channel& channel : image.channels) {
-    const auto bad = static_cast<std::size_t>(
-        std::ranges::find_if_not(channel.values, [](float v) { return std::isfinite(v); }) -
-        channel.values.begin());
-    if (bad == channel.values.size()) continue;
-    const auto width = static_cast<std::size_t>(image.width);
-    fmt::print("  channel {} is NaN or infinite, first at pixel ({}, {})\n", channel.name,
-               image.x + static_cast<int>(bad % width), image.y + static_cast<int>(bad / width));
+    const BadValues bad = find_bad_values(image, channel);
+    if (bad.count == 0) continue;
+    fmt::print("  channel {} is NaN or infinite, first at pixel ({}, {})\n", channel.name, bad.x, bad.y);
     flawed = true;
   }
   return flawed;

@@ -93,17 +93,8 @@ Point make_point(const Options& options, const Scene& scene, std::size_t medium,
   return point;
 }
 
-// Materials of all points of the plan, and what they have in common.
-struct Materials {
-  std::vector<Medium> plan;
-  MaterialFamilies sorted;
-
-  std::uint32_t family_of(const Point* point) const { return sorted.places[point->index].family; }
-};
-
-std::string make_key(KeyValues conditions, const Point& point, const Materials& materials) {
-  conditions.emplace_back("refined for",
-                          family_digest(materials.sorted.families[materials.family_of(&point)]));
+std::string make_key(KeyValues conditions, const Point& point, const MaterialFamilies& materials) {
+  conditions.emplace_back("refined for", materials.digests[materials.places[point.index].family]);
   for (const Setting& setting : *point.settings)
     conditions.emplace_back(setting.key + (setting.relative ? "*" : ""), setting.value);
   for (const std::string& light : point.lights) conditions.emplace_back("light", light);
@@ -120,12 +111,12 @@ std::string describe_command(const Options& options, const Point& point) {
 }
 
 // Renders points that share camera, lights and eta, and so everything but what their materials make of it.
-void render_batch(const Options& options, std::size_t medium, const Materials& materials,
+void render_batch(const Options& options, std::size_t medium, const MaterialFamilies& materials,
                   std::span<const Point* const> batch, const World& world, const Cache& cache,
                   Session& session) {
   const Scene& scene = *world.scene;
   const RenderParams params = make_render_params(options, scene, batch[0]->camera);
-  MaterialSweep sweep{medium, materials.plan, {}};
+  MaterialSweep sweep{medium, materials, {}};
   for (const Point* const point : batch) sweep.wanted.push_back(static_cast<std::uint32_t>(point->index));
   const Stopwatch watch;
   Warnings warnings;
@@ -150,8 +141,9 @@ void render_batch(const Options& options, std::size_t medium, const Materials& m
   }
 }
 
-void render_points(const Options& options, Scene& scene, std::size_t medium, const Materials& materials,
-                   const std::vector<const Point*>& points, Session& session) {
+void render_points(const Options& options, Scene& scene, std::size_t medium,
+                   const MaterialFamilies& materials, const std::vector<const Point*>& points,
+                   Session& session) {
   const std::vector<Medium> media = scene.media;
   const std::vector<Light> lights = scene.lights;
   World world = [&] {
@@ -171,7 +163,7 @@ void render_points(const Options& options, Scene& scene, std::size_t medium, con
   std::optional<Cache> cache;
   const Group* last = nullptr;
   for (auto& [group, members] : groups) {
-    std::ranges::stable_sort(members, {}, [&](const Point* p) { return materials.family_of(p); });
+    std::ranges::stable_sort(members, {}, [&](const Point* p) { return materials.places[p->index].family; });
     // Neighbouring groups mostly differ in the camera alone.
     if (!last || std::get<0>(*last) != std::get<0>(group) || std::get<1>(*last) != std::get<1>(group)) {
       scene.media = media;
@@ -315,12 +307,12 @@ void run(const Options& options, const CLI::App& command, const std::string& com
     return result;
   }();
   std::vector<Point> points;
-  Materials materials;
+  std::vector<Medium> media;
   for (std::size_t i = 0; i < plan.points.size(); ++i) {
     points.push_back(make_point(options, scene, medium, i, plan.points[i]));
-    materials.plan.push_back(points.back().material);
+    media.push_back(points.back().material);
   }
-  materials.sorted = sort_materials(materials.plan);
+  const MaterialFamilies materials = sort_materials(media);
   for (Point& point : points) point.key = make_key(conditions, point, materials);
   make_folders(options.output);
 

@@ -12,7 +12,10 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
+#include <map>
+#include <mutex>
 #include <utility>
+#include <vector>
 
 #include "base/files_in_use.h"
 
@@ -44,20 +47,36 @@ std::string folder_of(const std::string& path) {
 
 std::string link_to(int descriptor) { return fmt::format("/proc/self/fd/{}", descriptor); }
 
+constexpr const char* kTemporary = ".tmp-";  // between a target's name and a number
+
 constexpr std::time_t kSurelyLocked = 60;  // seconds after which a file that is written to has its lock
+
+// Temporary files that are in a folder when this process first writes there: one of thousands of pictures is
+// not searched for each of them.
+const std::vector<std::filesystem::path>& temporaries_in(const std::string& folder) {
+  static std::mutex mutex;
+  static std::map<std::string, std::vector<std::filesystem::path>> found;
+  const std::lock_guard lock(mutex);
+  const auto [place, is_new] = found.try_emplace(folder);
+  std::error_code ignored;
+  if (is_new)
+    for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
+      if (entry.path().filename().string().find(kTemporary) != std::string::npos)
+        place->second.push_back(entry.path());
+  return place->second;
+}
 
 // Removes what processes that were killed have left beside a target: who still writes holds a lock.
 void remove_leftovers(const std::string& target) {
-  const std::string start = std::filesystem::path(target).filename().string() + ".tmp-";
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(folder_of(target), ignored)) {
-    if (!entry.path().filename().string().starts_with(start)) continue;
-    const int descriptor = ::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  const std::string start = std::filesystem::path(target).filename().string() + kTemporary;
+  for (const std::filesystem::path& path : temporaries_in(folder_of(target))) {
+    if (!path.filename().string().starts_with(start)) continue;
+    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (descriptor < 0) continue;
     struct stat status;
     if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
         status.st_mtime + kSurelyLocked < std::time(nullptr) && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0)
-      ::unlink(entry.path().c_str());
+      ::unlink(path.c_str());
     ::close(descriptor);
   }
 }
@@ -68,7 +87,7 @@ struct AtomicFile::Temporary {
   explicit Temporary(const std::string& target) : path(next_name(target)) {}
   static std::string next_name(const std::string& target) {
     static std::atomic<unsigned> serial{0};
-    return fmt::format("{}.tmp-{}-{}", target, ::getpid(), serial++);
+    return fmt::format("{}{}{}-{}", target, kTemporary, ::getpid(), serial++);
   }
   std::string path;
   FileInUse in_use = FileInUse::temporary(path);

@@ -37,21 +37,6 @@ constexpr double kMiddlesTolerance = 0.005;
 
 constexpr float kNoLimit = 1e30f;
 
-// How fast a profile falls far away, per scene unit: within a mean
-// free path if light is absorbed rather than scattered. In the dark the sum is then a few nodes, whose errors
-// do not cancel.
-double decay(const Profile& profile) {
-  return profile.total > 0 ? std::min(profile.terms[0].sigma, profile.terms[1].sigma) : 0;
-}
-
-// Mean free paths are of this many scene units.
-double length_of(std::span<const Medium> media) {
-  double length = std::numeric_limits<double>::infinity();
-  for (const Medium& medium : media)
-    length = std::min(length, double{smallest_mean_free_path(medium)} / double{medium.scale});
-  return length;
-}
-
 Medium in_units(Medium medium, float unit) {
   medium.scale /= unit;
   return medium;
@@ -61,7 +46,7 @@ Medium in_units(Medium medium, float unit) {
 
 Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance, Promise promise)
     : group_(group),
-      unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(length_of(family.media)), -100, 100))),
+      unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(shortest_length(family.media)), -100, 100))),
       spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
       material_count_(family.wanted.size()),
       promise_(promise),
@@ -73,7 +58,7 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
              size(2 * root.radius);
   // Whole blocks around all samples, and no more than 2^20 cells an axis. Cells are for receivers, too, which
   // lie closer than a mean free path only where each of them has to be certain.
-  const double length = double{unit_} * length_of(family.media);
+  const double length = double{unit_} * shortest_length(family.media);
   cell_size_ = std::max({kCellSpacings * spacing_, promise == Promise::kCertified ? 0 : kCellLengths * length,
                          0x1p-20 * double{size.x}});
   if (!(cell_size_ > 0)) cell_size_ = 1;
@@ -153,11 +138,15 @@ void Exitance::make_kernels(const MaterialFamily& family) {
           std::array{profiles(choice[0])[0], profiles(choice[1])[1], profiles(choice[2])[2]});
     }
     for (std::size_t k = 0; k < 3; ++k)
-      fastest = std::max(fastest, decay(make_profiles(in_units(family.media[choice[k]], unit_))[k]));
+      if (const Profile profile = make_profiles(in_units(family.media[choice[k]], unit_))[k];
+          profile.total > 0)
+        fastest = std::max(fastest, profile.decay());
   }
-  // Hardly any less where light falls off within a mean free path or more, a tenth at half of one.
+  // If light is absorbed rather than scattered R_d falls within a mean free path, and in the dark the sum is
+  // a few nodes, whose errors do not cancel. Hardly any less where it falls within one or more, a tenth at
+  // half.
   if (promise_ == Promise::kCalibrated)
-    own_share_ = 1 / (1 + 0.4 * std::pow(fastest * double{unit_} * length_of(family.media), 6));
+    own_share_ = 1 / (1 + 0.4 * std::pow(fastest * double{unit_} * shortest_length(family.media), 6));
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

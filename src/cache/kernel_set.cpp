@@ -37,8 +37,7 @@ std::vector<float> interleave(std::span<const Table> tables, std::size_t fields,
 }  // namespace
 
 KernelSet::KernelSet(std::span<const Kernel> kernels)
-    : count_(kernels.size()),
-      padded_((kernels.size() + kLanes - 1) / kLanes * kLanes),
+    : padded_((kernels.size() + kLanes - 1) / kLanes * kLanes),
       interpolated_(kernels[0].tables().interpolated) {
   std::vector<Table> cells, jets;
   for (const Kernel& kernel : kernels) {

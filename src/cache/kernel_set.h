@@ -17,7 +17,6 @@ class KernelSet {
   /// All interpolated or none. No fewer than one.
   explicit KernelSet(std::span<const Kernel> kernels);
 
-  std::size_t count() const noexcept { return count_; }
   std::size_t padded() const noexcept { return padded_; }
   std::size_t width() const noexcept { return 3 * padded_; }
   bool interpolated() const noexcept { return interpolated_; }
@@ -30,7 +29,7 @@ class KernelSet {
   static constexpr std::size_t kLanes = 8;
 
  private:
-  std::size_t count_, padded_;
+  std::size_t padded_;
   bool interpolated_;
   std::vector<float> cells_, jets_;
   DistanceBins cell_bins_{}, jet_bins_{};

@@ -99,6 +99,18 @@ HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
                  hn::Set(df, 1.0f / static_cast<float>(1 << bins.shift)));
 }
 
+// Where a run of squared distances lies in a table.
+template <bool kInterpolated, std::size_t kRun>
+struct RunRows {
+  HWY_ALIGN std::int32_t row[kRun];
+  HWY_ALIGN float fraction[kInterpolated ? kRun : 1];
+
+  HWY_INLINE void find(std::size_t i, const DistanceBins& bins, VF r2) {
+    hn::Store(find_cell(bins, r2), I(), row + i);
+    if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
+  }
+};
+
 HWY_INLINE VF length2(VF x, VF y, VF z) { return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))); }
 
 // A vector of indices, and which of them are of the list: it has to be padded.

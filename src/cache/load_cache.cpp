@@ -1,6 +1,7 @@
 // Reading cache files: what sections hold may be hostile, so every link and number is checked before use.
 #include <atomic>
 #include <charconv>
+#include <limits>
 
 #include "cache/cache_layout.h"
 #include "cache/light_planes.h"
@@ -11,7 +12,8 @@
 namespace nacre {
 namespace {
 
-constexpr float kFarthest = 2e15f;  // than which no scene reaches further, rounding included
+// Rounding included: no scene reaches further, no normal is longer.
+constexpr float kFarthest = 2e15f, kLongest = 1.001f;
 
 // Whether all of `values` satisfy a condition, on all cores.
 template <class T, class Condition>
@@ -29,17 +31,19 @@ void check_planes(const layout::SectionReader& reader, const CacheGroup& group, 
   for (std::size_t k = 0; k < kPlaneCount; ++k) {
     const auto kind = layout::kPlanes[k];
     if (group.planes[k].size() != group.size()) reader.damaged(kind, index, "planes differ in length");
-    const bool signed_plane = k < static_cast<std::size_t>(Plane::kArea);
-    if (!all(group.planes[k], [&](float v) { return std::isfinite(v) && (signed_plane || v >= 0); }))
+    const bool position = k < static_cast<std::size_t>(Plane::kNormalX),
+               normal = !position && k < static_cast<std::size_t>(Plane::kArea);
+    const float least = position ? -kFarthest
+                        : normal ? -kLongest
+                                 : 0,
+                most = position ? kFarthest
+                       : normal ? kLongest
+                                : std::numeric_limits<float>::max();
+    if (!all(group.planes[k], [&](float v) { return v >= least && v <= most; }))
       reader.damaged(kind, index,
-                     signed_plane ? "a value is not finite" : "a value is negative or not finite");
-  }
-  for (std::size_t k = 0; k < static_cast<std::size_t>(Plane::kArea); ++k) {
-    const bool normal = k >= static_cast<std::size_t>(Plane::kNormalX);
-    if (!all(group.planes[k], [&](float v) { return std::abs(v) <= (normal ? 1.001f : kFarthest); }))
-      reader.damaged(
-          layout::kPlanes[k], index,
-          normal ? "a normal is longer than 1" : "a position is further away than any scene reaches");
+                     position ? "a value is not finite, or a position further away than any scene reaches"
+                     : normal ? "a value is not finite, or a normal longer than 1"
+                              : "a value is negative or not finite");
   }
   // Infinite power times a vanished profile would not be a number.
   const auto areas = group.plane(Plane::kArea);

@@ -16,15 +16,20 @@ namespace {
 constexpr float kAbsorbing = 0.8f;  // albedo below which much is absorbed
 
 auto family_key(const Medium& medium) {
-  const double length = double{smallest_mean_free_path(medium)} / double{medium.scale};
-  const auto half_octaves = static_cast<int>(std::floor(std::clamp(2 * std::log2(length), -4000.0, 4000.0)));
+  const double octaves = std::log2(shortest_length(std::span(&medium, 1)));
+  const auto half_octaves = static_cast<int>(std::floor(std::clamp(2 * octaves, -4000.0, 4000.0)));
   return std::tuple(half_octaves, absorbs_much(medium), medium.profile, medium.eta(), medium.lambert,
                     medium.convention);
 }
 
-double fall(const Profile& profile) { return std::min(profile.terms[0].sigma, profile.terms[1].sigma); }
-
 }  // namespace
+
+double shortest_length(std::span<const Medium> media) {
+  double length = std::numeric_limits<double>::infinity();
+  for (const Medium& medium : media)
+    length = std::min(length, double{smallest_mean_free_path(medium)} / double{medium.scale});
+  return length;
+}
 
 bool absorbs_much(const Medium& medium) { return min_channel(reduce(medium).alpha_prime) < kAbsorbing; }
 
@@ -39,6 +44,7 @@ MaterialFamilies sort_materials(std::span<const Medium> media) {
     result.places.push_back({family, static_cast<std::uint32_t>(members.size())});
     members.push_back(medium);
   }
+  for (const MaterialFamily& family : result.families) result.digests.push_back(family_digest(family));
   return result;
 }
 
@@ -58,8 +64,8 @@ std::vector<ChannelChoice> find_extremes(std::span<const Medium> media) {
   };
   choose([](const Profile& profile) { return -profile.width; });
   choose([](const Profile& profile) { return profile.width; });
-  choose([](const Profile& profile) { return fall(profile); });
-  choose([](const Profile& profile) { return -fall(profile); });
+  choose([](const Profile& profile) { return profile.decay(); });
+  choose([](const Profile& profile) { return -profile.decay(); });
   return choices;
 }
 

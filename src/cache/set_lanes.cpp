@@ -20,18 +20,14 @@ using VK = hn::Vec<K>;
 
 // What one run of sources finds in a table with `kFields` fields a row.
 template <bool kInterpolated, int kFields, std::size_t kRun>
-struct SetRows {
+struct SetRows : RunRows<kInterpolated, kRun> {
+  using RunRows<kInterpolated, kRun>::row;
+  using RunRows<kInterpolated, kRun>::fraction;
   static constexpr std::size_t kStep = kInterpolated ? 2 : 1;
   const float* table;
   std::size_t width;
-  HWY_ALIGN std::int32_t row[kRun];
-  HWY_ALIGN float fraction[kInterpolated ? kRun : 1];
 
   HWY_INLINE SetRows(const float* first, std::size_t size) : table(first), width(size) {}
-  HWY_INLINE void find(std::size_t i, const DistanceBins& bins, VF r2) {
-    hn::Store(find_cell(bins, r2), I(), row + i);
-    if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
-  }
   // From `lane` on.
   HWY_INLINE VK operator()(std::size_t i, std::size_t field, std::size_t lane) const {
     const float* const at =

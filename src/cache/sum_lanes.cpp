@@ -18,16 +18,12 @@ namespace nacre::lanes::HWY_NAMESPACE {
 // difference to the next row if the table is interpolated. Rows are read one by one: a gather takes as long
 // for one float of each.
 template <bool kInterpolated, int kFields, std::size_t kRun>
-struct Rows {
+struct Rows : RunRows<kInterpolated, kRun> {
+  using RunRows<kInterpolated, kRun>::row;
+  using RunRows<kInterpolated, kRun>::fraction;
   const Float4* table;
-  HWY_ALIGN std::int32_t row[kRun];
-  HWY_ALIGN float fraction[kInterpolated ? kRun : 1];
 
   HWY_INLINE Rows(const float* first) : table(reinterpret_cast<const Float4*>(first)) {}
-  HWY_INLINE void find(std::size_t i, const DistanceBins& bins, VF r2) {
-    hn::Store(find_cell(bins, r2), I(), row + i);
-    if constexpr (kInterpolated) hn::Store(find_fraction(bins, r2), F(), fraction + i);
-  }
   // Those of i and what follows it.
   HWY_INLINE Quads operator()(std::size_t i, int field) const {
     constexpr int kStep = kInterpolated ? 2 : 1;

@@ -8,37 +8,36 @@
 namespace nacre {
 namespace {
 
-struct BadValues {
-  std::size_t count = 0, first = 0;
-};
-
-BadValues count_bad_values(const std::vector<float>& values) {
-  BadValues bad;
-  for (const float v : values) bad.count += !std::isfinite(v);
-  if (bad.count > 0)
-    bad.first = static_cast<std::size_t>(
-        std::ranges::find_if_not(values, [](float v) { return std::isfinite(v); }) - values.begin());
-  return bad;
-}
-
 void check_values(const Image& image, const std::string& path) {
   std::vector<BadValues> bad(image.channels.size());
   parallel_for(bad.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) bad[i] = count_bad_values(image.channels[i].values);
+    for (std::size_t i = begin; i < end; ++i) bad[i] = find_bad_values(image, image.channels[i]);
   });
   std::size_t total = 0;
   for (const BadValues& b : bad) total += b.count;
   if (total == 0) return;
   const auto first = std::ranges::find_if(bad, [](const BadValues& b) { return b.count > 0; });
-  const auto width = static_cast<std::size_t>(image.width);
   fail(ErrorCode::kValue, path,
        "not written: {} of the image's values {} NaN or infinite, the first in channel {} at pixel ({}, {}); "
        "this is a bug in what made the image",
        total, total == 1 ? "is" : "are", image.channels[static_cast<std::size_t>(first - bad.begin())].name,
-       image.x + static_cast<int>(first->first % width), image.y + static_cast<int>(first->first / width));
+       first->x, first->y);
 }
 
 }  // namespace
+
+BadValues find_bad_values(const Image& image, const Channel& channel) {
+  BadValues bad;
+  for (const float v : channel.values) bad.count += !std::isfinite(v);
+  if (bad.count == 0) return bad;
+  const auto first = static_cast<std::size_t>(
+      std::ranges::find_if_not(channel.values, [](float v) { return std::isfinite(v); }) -
+      channel.values.begin());
+  const auto width = static_cast<std::size_t>(image.width);
+  bad.x = image.x + static_cast<int>(first % width);
+  bad.y = image.y + static_cast<int>(first / width);
+  return bad;
+}
 
 void check_image(const Image& image, const std::string& path) {
   constexpr int kFarthest = 1 << 29;  // keeps sums of coordinates inside an int

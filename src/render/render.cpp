@@ -44,6 +44,25 @@ std::vector<Tile> make_tiles(const RenderParams& params) {
   return tiles;
 }
 
+// The families of which anything is wanted, and where in them pictures are.
+std::pair<std::vector<MaterialFamily>, std::vector<MaterialFamilies::Place>> choose_families(
+    const MaterialSweep& sweep) {
+  std::vector<MaterialFamily> families;
+  std::vector<MaterialFamilies::Place> of_picture;
+  std::vector<std::uint32_t> chosen(sweep.plan.families.size(), kUnused);  // where they are now
+  for (const std::uint32_t index : sweep.wanted) {
+    const auto [f, member] = sweep.plan.places[index];
+    if (chosen[f] == kUnused) {
+      chosen[f] = static_cast<std::uint32_t>(families.size());
+      families.push_back(sweep.plan.families[f]);
+    }
+    std::vector<std::uint32_t>& wanted = families[chosen[f]].wanted;
+    of_picture.push_back({chosen[f], static_cast<std::uint32_t>(wanted.size())});
+    wanted.push_back(member);
+  }
+  return {families, of_picture};
+}
+
 }  // namespace
 
 RenderParams default_render_params(const Scene& scene, std::size_t camera) {
@@ -71,21 +90,10 @@ Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& p
       filling.of_picture.resize(pictures_, {0, 0});
       continue;
     }
-    MaterialFamilies sorted = sort_materials(sweep.plan);
-    std::vector<std::uint32_t> used(sorted.families.size(), kUnused);  // where among the filling's
-    std::vector<const MaterialFamily*> families;
-    for (const std::uint32_t index : sweep.wanted) {
-      const auto [f, member] = sorted.places[index];
-      MaterialFamily& family = sorted.families[f];
-      if (used[f] == kUnused) {
-        used[f] = static_cast<std::uint32_t>(families.size());
-        families.push_back(&family);
-      }
-      filling.of_picture.push_back({used[f], static_cast<std::uint32_t>(family.wanted.size())});
-      family.wanted.push_back(member);
-    }
-    for (const MaterialFamily* const family : families)
-      filling.families.emplace_back(world, m, *family, group, params);
+    const auto [families, of_picture] = choose_families(sweep);
+    for (const MaterialFamily& family : families)
+      filling.families.emplace_back(world, m, family, group, params);
+    filling.of_picture = of_picture;
   }
 }
 Renderer::~Renderer() = default;

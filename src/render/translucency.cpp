@@ -60,9 +60,7 @@ void Translucency::make_field(const MaterialFamily& family, const CacheGroup& gr
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
-  double length = std::numeric_limits<double>::infinity();
-  for (const Medium& m : family.media)
-    length = std::min(length, double{smallest_mean_free_path(m)} / double{m.scale});
+  const double length = shortest_length(family.media);
   if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
   if (group.size() == 0) return;
   constexpr double kNodesPerRadius = 3, kAbsorbing = 0.75;

@@ -27,15 +27,6 @@ const std::map<PieceFault, const char*> kInShort{{PieceFault::kCopy, "copies"},
                                                  {PieceFault::kFlat, "without thickness"},
                                                  {PieceFault::kInside, "inside others"}};
 
-double furthest_coordinate(const Scene& scene, std::size_t medium) {
-  float furthest = 0;
-  for (const Shape& shape : scene.shapes)
-    if (shape.medium == static_cast<int>(medium))
-      for (const Vec3& p : shape.mesh.positions)
-        furthest = std::max({furthest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-  return double{furthest};
-}
-
 // "left lies on right (scene.xml:7)", what comes of it, and what to do.
 std::string describe(const FaultyPieces& faulty, const Shape& shape, const Shape& other) {
   const bool itself = faulty.mesh == faulty.other;
@@ -92,6 +83,8 @@ MediumExtent measure_medium(const Scene& scene, std::size_t medium) {
   MediumExtent extent;
   if (box.isEmpty()) return extent;
   const double scale = scene.media[medium].scale;
+  for (int k = 0; k < 3; ++k)
+    extent.furthest = std::max({extent.furthest, std::abs(box.min[k]), std::abs(box.max[k])});
   extent.size_mm = box.size() * static_cast<float>(scale);
   extent.area_mm2 = area * square(scale);
   extent.thickness_mm = std::min({extent.size_mm.x, extent.size_mm.y, extent.size_mm.z});
@@ -119,8 +112,8 @@ Warnings check_validity(const Scene& scene) {
           "{}it is {:.3g} mm thick, {:.2g} mean free paths, and diffusion wants at least {:.0f}; check "
           "`scale`",
           reasons.empty() ? "" : "; ", extent.thickness_mm, extent.thickness_mm / longest, kLeastThickness);
-    const double rounding = furthest_coordinate(scene, m) * 0x1p-24 * double{medium.scale} /
-                            double{smallest_mean_free_path(medium)};
+    const double rounding =
+        double{extent.furthest} * 0x1p-24 * double{medium.scale} / double{smallest_mean_free_path(medium)};
     if (rounding > kMostRounding)
       reasons += fmt::format(
           "{}it is so far from the origin that coordinates are rounded by {:.2g} mean free paths; move the "

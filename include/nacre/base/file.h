@@ -17,8 +17,8 @@ class AtomicFile {
  public:
   /// Opens a file without a name in the folder of `path`, which not even SIGKILL leaves behind, or
   /// `path`.tmp-<pid>-<n> where the file system has none such; removes such files that a killed process has
-  /// left, which hold no lock. Throws Error(kIo, path) if the folder is
-  /// missing or not writable, or `path` is a folder, a pipe or a socket.
+  /// left, which hold no lock. Throws Error(kIo, path) if the folder is missing or not writable, or `path` is
+  /// a folder, a pipe or a socket.
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

@@ -58,14 +58,13 @@ class Exitance {
   std::size_t material_count() const noexcept { return material_count_; }
 
   /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units, with all materials of a
-  /// point side by side. Space is divided into
-  /// blocks, those into cells, down to a few distances of samples. A node of the octree stands for its
-  /// samples, and its contribution to a block or cell is a Taylor series of second order around its centre,
-  /// where a bound on both errors is small against the whole sum; what is too near for a block is left to
-  /// its parts, and in a cell summed point by point. Blocks and cells are fixed in space, so that a point's
-  /// value does not depend on its company; points that lie near each other are cheap. Counts evaluations of
-  /// R_d in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy, Greengard & Rokhlin 1987 for the
-  /// expansions; the error bounds and the cells are nacre's own.
+  /// point side by side. Space is divided into blocks, those into cells, down to a few distances of samples.
+  /// A node of the octree stands for its samples, and its contribution to a block or cell is a Taylor series
+  /// of second order around its centre, where a bound on both errors is small against the whole sum; what is
+  /// too near for a block is left to its parts, and in a cell summed point by point. Blocks and cells are
+  /// fixed in space, so that a point's value does not depend on its company; points that lie near each other
+  /// are cheap. Counts evaluations of R_d in `evaluations`. Source: Jensen & Buhler 2002 for the hierarchy,
+  /// Greengard & Rokhlin 1987 for the expansions; the error bounds and the cells are nacre's own.
   void eval(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
   /// The same for points that are all there will ever be in the cells of level kWholeLevel in which they lie:
   /// the parts of those cells fit closely around them.

@@ -24,12 +24,16 @@ struct MaterialFamily {
 /// intervals make a member's family independent of what else there is in others.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
+  std::vector<std::string> digests;  // of each, see family_digest
   struct Place {
     std::uint32_t family, index;  // of a medium in MaterialFamily::media
   };
   std::vector<Place> places;  // parallel to `media`
 };
 MaterialFamilies sort_materials(std::span<const Medium> media);
+
+/// The smallest mean free path of any channel of the media, in scene units.
+double shortest_length(std::span<const Medium> media);
 
 /// In each channel, the members that are the narrowest, the widest, and that fall fastest and slowest far
 /// away: a choice for each channel, none twice. What lies between them is no stricter.

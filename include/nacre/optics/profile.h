@@ -1,6 +1,7 @@
 // Diffusion profiles: how much of the light that enters at one point leaves at another, by distance.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "nacre/optics/medium.h"
@@ -18,6 +19,8 @@ struct Profile {
   double total = 0;  // integral of R over the plane: diffuse reflectance of a half-space
   double width = 1;  // length over which R changes near r = 0: z_r, or l / s for a profile singular there
 
+  /// How fast R falls far away, per scene unit: the slower of its exponentials.
+  double decay() const { return std::min(terms[0].sigma, terms[1].sigma); }
   /// True if R grows like 1/r at 0, where no sum over samples can follow it: see resolve_profile.
   bool singular() const { return terms[0].z == 0; }
 };

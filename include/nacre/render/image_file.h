@@ -28,6 +28,13 @@ struct Image {
 /// The channel of that name, or nullptr.
 const Channel* find_channel(const Image& image, const std::string& name);
 
+/// The values of a channel of an image that are NaN or infinite: how many, and the pixel of the first.
+struct BadValues {
+  std::size_t count = 0;
+  int x = 0, y = 0;
+};
+BadValues find_bad_values(const Image& image, const Channel& channel);
+
 /// Writes 32-bit float scanline OpenEXR, ZIP compressed. The file appears under its name only when complete:
 /// written under a temporary name in the same folder, synced, renamed; on failure the temporary is removed.
 /// Throws Error(kIo, path) when it cannot; Error(kValue, path) that counts them and names channel and pixel

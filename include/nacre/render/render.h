@@ -10,6 +10,7 @@
 #include "nacre/base/progress.h"
 #include "nacre/base/report.h"
 #include "nacre/cache/cache.h"
+#include "nacre/cache/material_family.h"
 #include "nacre/render/image_file.h"
 #include "nacre/render/monte_carlo.h"
 #include "nacre/transport/world.h"
@@ -66,8 +67,8 @@ struct Verification {
 /// What the plan has in common is refined for the strictest of the whole, so that its parts agree.
 struct MaterialSweep {
   std::size_t medium = 0;  // of the scene
-  std::vector<Medium> plan;
-  std::vector<std::uint32_t> wanted;  // indices into it
+  MaterialFamilies plan;
+  std::vector<std::uint32_t> wanted;  // indices into MaterialFamilies::places
 };
 
 /// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is

@@ -13,6 +13,7 @@ struct MediumExtent {
   Vec3 size_mm{0, 0, 0};
   double thickness_mm = 0;
   double area_mm2 = 0;
+  float furthest = 0;  // coordinate of any point, scene units
 };
 MediumExtent measure_medium(const Scene& scene, std::size_t medium);
 
