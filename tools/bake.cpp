@@ -37,6 +37,7 @@ void run(const Options& options, const std::string& command_line) {
   std::optional<Cache> old;
   if (options.add_lights) old = load_cache(options.output);
   const Scene scene = load_scene(options.scene, session);
+  check_apart(scene, {options.output});
   session.warn(check_bodies(scene));
   BakeParams params = options.bake.params(options.common);
   params.per_light = options.per_light;

@@ -236,11 +236,20 @@ bool is_same_file(const std::string& a, const std::string& b) {
   return std::filesystem::equivalent(a, b, ignored) || resolve(a) == resolve(b);
 }
 
-void check_writable(const std::string& path, const std::vector<std::string>& inputs) {
+void check_is_none_of(const std::string& path, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs)
     if (!input.empty() && is_same_file(path, input))
       throw UsageError(path + " is what this command reads; give another output file");
+}
+
+void check_writable(const std::string& path, const std::vector<std::string>& inputs) {
+  check_is_none_of(path, inputs);
   const AtomicFile probe(path);
+}
+
+void check_apart(const Scene& scene, const std::vector<std::string>& outputs) {
+  for (const std::string& output : outputs)
+    if (!output.empty()) check_is_none_of(output, scene.files);
 }
 
 std::array<int, 2> parse_size(const std::string& text, const std::string& option) {

@@ -90,6 +90,8 @@ Cache run_bake(const World& world, const BakeParams& params, Session& session);
 /// Fails early, before any work, if a file cannot be created there or if it would replace one of the
 /// `inputs`.
 void check_writable(const std::string& path, const std::vector<std::string>& inputs = {});
+/// Throws UsageError if one of `outputs` is a file that the scene was made of.
+void check_apart(const Scene& scene, const std::vector<std::string>& outputs);
 /// "640x480" to two positive numbers; `option` names the culprit.
 std::array<int, 2> parse_size(const std::string& text, const std::string& option);
 /// "12 MB" and the like.

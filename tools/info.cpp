@@ -148,7 +148,7 @@ void show_cache(const std::string& path) {
   for (const auto& [key, value] : cache.fingerprint) fmt::print("  {}: {}\n", key, value);
 }
 
-// Returns whether a value is no number.
+// Returns whether a value is no number, or not what was written.
 bool show_image(const std::string& path) {
   const Image image = load_exr(path);
   fmt::print("image {}: {}x{}", path, image.full_width, image.full_height);
@@ -163,7 +163,8 @@ bool show_image(const std::string& path) {
                sum / static_cast<double>(channel.values.size()), *low, *high);
   }
   for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", key, value);
-  bool flawed = false;
+  bool flawed = check_seal(image) == Seal::kBroken;
+  if (flawed) fmt::print("  is not as nacre wrote it: damaged, or changed by another program\n");
   for (const Channel& channel : image.channels) {
     const BadValues bad = find_bad_values(image, channel);
     if (bad.count == 0) continue;

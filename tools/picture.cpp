@@ -43,7 +43,7 @@ bool is_complete(const Picture& picture) {
   try {
     const Image image = load_exr(picture.path);
     const auto key = image.metadata.find(kKeyAttribute);
-    return key != image.metadata.end() && key->second == picture.key;
+    return key != image.metadata.end() && key->second == picture.key && check_seal(image) == Seal::kSound;
   } catch (const Error&) {
     return false;
   }

@@ -260,6 +260,9 @@ void run(const Options& options, const std::string& command_line) {
   check_outputs(options, film ? choose(*film, pictures) : pictures);
 
   Scene scene = load_scene(options.scene, session);
+  check_apart(scene, {options.exitance, options.film.contact_sheet});
+  for (const Picture& picture : pictures)
+    check_apart(scene, {picture.path, options.png ? picture.preview : ""});
   const std::vector<Rgb> light_scales = find_light_scales(scene, options.lights);
   set_params(options, film, scene, pictures);
   BakeParams bake_params = options.bake.params(options.common);

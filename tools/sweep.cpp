@@ -314,6 +314,10 @@ void run(const Options& options, const CLI::App& command, const std::string& com
   }
   const MaterialFamilies materials = sort_materials(media);
   for (Point& point : points) point.key = make_key(conditions, point, materials);
+  for (const Point& point : points) {
+    const std::string picture = options.output + "/" + picture_name(point.index);
+    check_apart(scene, {picture + ".exr", picture + ".png"});
+  }
   make_folders(options.output);
 
   std::vector<const Point*> pending;

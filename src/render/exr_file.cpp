@@ -20,6 +20,7 @@
 #include "nacre/base/parallel.h"
 #include "nacre/render/image_file.h"
 #include "render/image_check.h"
+#include "render/image_digest.h"
 
 namespace nacre {
 namespace {
@@ -160,7 +161,8 @@ const Channel* find_channel(const Image& image, const std::string& name) {
 
 void save_exr(const Image& image, const std::string& path) {
   check_image(image, path);
-  const Imf::Header header = make_header(image, path);
+  Imf::Header header = make_header(image, path);
+  header.insert(kDigestKey, Imf::StringAttribute(image_digest(image)));
   Imf::FrameBuffer buffer;
   for (const Channel& channel : image.channels)
     buffer.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.values.data(), header.dataWindow()));

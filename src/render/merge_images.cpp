@@ -24,7 +24,7 @@ std::vector<std::string> sorted_names(const Image& image) {
 // Without what is of a part alone.
 std::map<std::string, std::string> common_metadata(const Image& image) {
   std::map<std::string, std::string> metadata = image.metadata;
-  for (const char* const own : {"nacre:command", "nacre:key"}) metadata.erase(own);
+  for (const char* const own : {"nacre:command", "nacre:key", kDigestKey}) metadata.erase(own);
   return metadata;
 }
 
@@ -92,6 +92,9 @@ Image merge_images(const std::vector<std::string>& paths) {
   std::vector<Part> parts;
   for (const std::string& path : paths) {
     const Image part = load_exr(path);
+    if (check_seal(part) == Seal::kBroken)
+      fail(ErrorCode::kDamaged, path,
+           "is not as nacre wrote it: damaged, or changed by another program; render it again");
     if (parts.empty()) {
       frame = make_frame(part, path);
       covered.resize(static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height));

@@ -375,8 +375,9 @@ void Builder::add_default_camera() {
 Scene load_scene(const std::string& path, const Defines& defines, SceneFiles files) {
   Scene scene;
   scene.path = path;
-  const XmlElement root = load_scene_xml(path, defines, scene.warnings, files);
-  Builder(scene, root).build();
+  SceneXml xml = load_scene_xml(path, defines, scene.warnings, files);
+  Builder(scene, xml.scene).build();
+  scene.files = std::move(xml.files);
   return scene;
 }
 

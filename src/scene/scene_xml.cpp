@@ -125,6 +125,7 @@ class Loader {
     if (open_files_.size() >= kMaxDepth)
       fail(ErrorCode::kLimit, included_from, "includes are nested more than {} deep", kMaxDepth);
     open_files_.push_back(identity);
+    files_.insert(path);
 
     const Source source(path, text);
     if (const std::size_t nul = text.find('\0'); nul != std::string::npos)
@@ -152,6 +153,7 @@ class Loader {
   }
 
   bool is_used(const std::string& name) const { return used_.contains(name); }
+  std::vector<std::string> files() const { return {files_.begin(), files_.end()}; }
 
  private:
   struct Source {
@@ -179,7 +181,7 @@ class Loader {
 
   Defines values_;
   std::string sandbox_;
-  std::set<std::string> used_;
+  std::set<std::string> used_, files_;
   std::vector<std::string> open_files_;
   std::size_t tree_bytes_ = 0, file_count_ = 0;
 };
@@ -198,6 +200,8 @@ void Loader::convert(pugi::xml_node node, const Source& source, int depth, XmlEl
     charge(64 + element.attributes.back().second.size(), element);
   }
   check_attributes(element);
+  if (element.get("name") == "filename")
+    files_.insert((fs::path(element.file).parent_path() / element.get("value")).string());
 
   const bool leaf = find_rule(element).leaf;
   for (const pugi::xml_node child_node : node.children()) {
@@ -258,17 +262,18 @@ const std::string& XmlElement::get(std::string_view attribute) const {
   return found == attributes.end() ? none : found->second;
 }
 
-XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
-                          SceneFiles files) {
+SceneXml load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
+                        SceneFiles files) {
   std::string sandbox;
   if (files == SceneFiles::kOwnFolder) sandbox = resolve_links(fs::absolute(path).parent_path()).string();
   Loader loader(defines, sandbox);
-  XmlElement scene;
-  loader.load(path, "", scene);
+  SceneXml result;
+  loader.load(path, "", result.scene);
+  result.files = loader.files();
   for (const auto& [name, value] : defines)
     if (!loader.is_used(name))
       warnings.push_back(fmt::format("-D {}: nothing in {} uses ${}", name, path, name));
-  return scene;
+  return result;
 }
 
 std::string resolve_path(const std::string& name, const XmlElement& element) {

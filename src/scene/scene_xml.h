@@ -26,12 +26,17 @@ struct XmlElement {
   const std::string& get(std::string_view attribute) const;
 };
 
+struct SceneXml {
+  XmlElement scene;
+  std::vector<std::string> files;  // the file, what it includes, and what its elements name; none twice
+};
+
 /// Reads a file and what it includes into one <scene>. Throws Error with "file:line" for what is not XML, an
 /// element or attribute that scenes do not have, a required attribute that is missing, an undefined $name,
 /// and includes that are missing, circular or too many. Warns of a define that no $name uses. `files` says
 /// which files it and its elements may name.
-XmlElement load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
-                          SceneFiles files = SceneFiles::kAnywhere);
+SceneXml load_scene_xml(const std::string& path, const Defines& defines, Warnings& warnings,
+                        SceneFiles files = SceneFiles::kAnywhere);
 
 /// `name` as written in an element, relative to the folder of the element's file. Throws Error(kValue) at the
 /// element if it, or what a symbolic link makes of it, lies outside of the element's sandbox.

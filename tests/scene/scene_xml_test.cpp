@@ -11,7 +11,7 @@ using testing::Test;
 
 XmlElement load(const SceneFolder& folder, const std::string& text, const Defines& defines = {}) {
   Warnings warnings;
-  return load_scene_xml(folder.write("main.xml", text), defines, warnings);
+  return load_scene_xml(folder.write("main.xml", text), defines, warnings).scene;
 }
 
 std::string value_of(const std::string& text, const Defines& defines = {}) {

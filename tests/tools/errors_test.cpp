@@ -80,6 +80,20 @@ TEST_F(Errors, UnwritableOutput) {
   expect_refusal("bake s.xml -o .", 1, "cannot write");
 }
 
+// What a scene names is as dear as the scene.
+TEST_F(Errors, NothingReplacesWhatTheSceneIsMadeOf) {
+  folder_.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  folder_.write("part.xml", "<scene version=\"0.6.0\"/>");
+  edit("b.xml", "<shape type=\"sphere\" id=\"ball\">",
+       "<include filename=\"part.xml\"/>"
+       "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>"
+       "<shape type=\"sphere\" id=\"ball\">");
+  expect_refusal("bake b.xml -o ./m.obj", 2, "m.obj is what this command reads");
+  expect_refusal("render b.xml -o part.xml", 2, "part.xml is what this command reads");
+  expect_refusal("render b.xml -o a.exr --exitance m.obj", 1, "m.obj");
+  EXPECT_EQ(run_nacre(folder_, "render b.xml -o a.exr --quiet").exit_code, 0);
+}
+
 TEST_F(Errors, ReportsReplaceReportsOnly) {
   expect_refusal("info s.xml --report s.xml", 1, "s.xml: is there and is no report");
   folder_.write("r.json", "{}");

@@ -92,6 +92,13 @@ TEST_F(FilmCommand, GoesOnWhereItWas) {
   folder_.write("t.0004.exr", "no picture");
   expect_rendered(film(command), 3);
   EXPECT_EQ(bytes("t.0003.exr"), third);
+  // A name in the header that is another: the file is whole, the picture is not.
+  std::string renamed = bytes("t.0001.exr");
+  renamed[renamed.find("diffusion.R")] = 'x';
+  folder_.write("t.0001.exr", renamed);
+  EXPECT_NE(run_nacre(folder_, "info t.0001.exr --check").output.find("not as nacre wrote it"),
+            std::string::npos);
+  expect_rendered(film(command), 1);
   expect_rendered(film(command + " --seed 2"), 4);
   // The camera of frame 1 is the same in a film of other length.
   expect_rendered(film("-o t.####.exr --turntable 8 --seed 2"), 7);

@@ -11,6 +11,7 @@
 namespace nacre {
 namespace {
 
+using testing_support::read_file;
 using testing_support::run_nacre;
 using testing_support::TemporaryFolder;
 
@@ -31,10 +32,11 @@ class Tiles : public testing::Test {
     EXPECT_NE(output.find(text), std::string::npos) << output;
     EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
   }
-  // Every channel, bit for bit, and all that the header says but the command.
+  // Every channel, bit for bit, and all that the header says but the command, and what seals that.
   void expect_same(const std::string& a, const std::string& b) {
     Image first = load_exr(folder_.file(a)), second = load_exr(folder_.file(b));
-    for (Image* const image : {&first, &second}) image->metadata.erase("nacre:command");
+    for (Image* const image : {&first, &second})
+      for (const char* const own : {"nacre:command", kDigestKey}) image->metadata.erase(own);
     EXPECT_EQ(first.metadata, second.metadata);
     for (const std::string& layer : layer_names(second))
       EXPECT_TRUE(compare_images(first, second, layer).identical) << layer;
@@ -77,6 +79,10 @@ TEST_F(Tiles, RefuseWhatDoesNotFit) {
                  "1.exr: 1536 of the 64 x 48 pixels of the picture are in no part");
   expect_refusal("merge 1.exr 2.exr 1.exr -o x.exr", 1, "1.exr: overlaps 1.exr");
   expect_refusal("merge 1.exr 2.exr -o 2.exr", 2, "2.exr");
+  std::string changed = read_file(folder_.file("2.exr"));
+  changed[changed.find("diffusion.R")] = 'x';
+  folder_.write("changed.exr", changed);
+  expect_refusal("merge 1.exr changed.exr -o x.exr", 1, "changed.exr: is not as nacre wrote it");
   const auto expect_foreign = [&](const std::string& options, const std::string& text) {
     render("-o other.exr --tile 2/2 " + options);
     expect_refusal("merge 1.exr other.exr -o x.exr", 1, "other.exr: " + text);

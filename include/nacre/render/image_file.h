@@ -35,6 +35,13 @@ struct BadValues {
 };
 BadValues find_bad_values(const Image& image, const Channel& channel);
 
+/// Metadata that save_exr adds: a hash of the size, the channels and all other metadata.
+inline constexpr const char* kDigestKey = "nacre:digest";
+/// How an image compares to its kDigestKey: damage that leaves a file readable, and other programs, change
+/// it.
+enum class Seal { kNone, kSound, kBroken };
+Seal check_seal(const Image& image);
+
 /// Writes 32-bit float scanline OpenEXR, ZIP compressed. The file appears under its name only when complete:
 /// written under a temporary name in the same folder, synced, renamed; on failure the temporary is removed.
 /// Throws Error(kIo, path) when it cannot; Error(kValue, path) that counts them and names channel and pixel

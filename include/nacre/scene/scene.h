@@ -166,7 +166,8 @@ struct Integrator {
 };
 
 struct Scene {
-  std::string path;  // of the file it came from
+  std::string path;                // of the file it came from
+  std::vector<std::string> files;  // that one, and all that it includes or names
   std::vector<Shape> shapes;
   std::vector<Medium> media;
   std::vector<SubsurfaceSettings> subsurface;  // parallel to media
