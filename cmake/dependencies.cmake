@@ -14,4 +14,5 @@ unset(CMAKE_MESSAGE_LOG_LEVEL)
 
 # Headers that no consumer of the library needs.
 find_package(nlohmann_json REQUIRED)
+find_package(Eigen3 CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)

@@ -77,7 +77,7 @@ void add_bake_command(CLI::App& app, const std::string& command_line) {
   CLI::App* command =
       app.add_subcommand("bake", "Bake the irradiance on translucent surfaces into a cache file");
   add_scene_options(*command, options->scene);
-  command->add_option("-o,--output", options->output, "Cache file to write")->required();
+  command->add_option("-o,--output", options->output, "Cache file to write")->required()->check(not_empty());
   command->add_flag("--per-light", options->per_light,
                     "Keep what each light, or group of lights, sends apart, for `nacre render --light`");
   command->add_flag(

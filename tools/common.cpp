@@ -249,7 +249,23 @@ void check_writable(const std::string& path, const std::vector<std::string>& inp
 
 void check_apart(const Scene& scene, const std::vector<std::string>& outputs) {
   for (const std::string& output : outputs)
-    if (!output.empty()) check_is_none_of(output, scene.files);
+    if (!output.empty())
+      for (const auto* const files : {&scene.sources, &scene.files}) check_is_none_of(output, *files);
+}
+
+std::vector<std::string> option_words(const CLI::App& command, const std::set<std::string>& without) {
+  std::vector<std::string> words;
+  for (const CLI::Option* const option : command.get_options()) {
+    if (option->count() == 0 || without.contains(option->get_single_name())) continue;
+    const std::string name = option->nonpositional() ? option->get_name() : "";
+    if (option->get_expected_max() == 0)
+      words.push_back(name);
+    else
+      for (const std::string& value : option->results())
+        words.push_back(name.empty() ? value
+                                     : fmt::format("{}{}{}", name, name.starts_with("--") ? "=" : "", value));
+  }
+  return words;
 }
 
 std::array<int, 2> parse_size(const std::string& text, const std::string& option) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -92,6 +93,10 @@ Cache run_bake(const World& world, const BakeParams& params, Session& session);
 void check_writable(const std::string& path, const std::vector<std::string>& inputs = {});
 /// Throws UsageError if one of `outputs` is a file that the scene was made of.
 void check_apart(const Scene& scene, const std::vector<std::string>& outputs);
+/// What --exposure is unless it is given.
+inline constexpr const char* kExposure = "0";
+/// The words of a subcommand as they were given, the options named in `without` left out.
+std::vector<std::string> option_words(const CLI::App& command, const std::set<std::string>& without);
 /// "640x480" to two positive numbers; `option` names the culprit.
 std::array<int, 2> parse_size(const std::string& text, const std::string& option);
 /// "12 MB" and the like.

@@ -11,6 +11,7 @@ namespace nacre::tools {
 namespace {
 
 constexpr int kGap = 6, kLineHeight = 12;
+constexpr int kLeastWidth = 160;  // of a cell, which small pictures share with their labels
 constexpr std::uint8_t kBackground = 24, kInk = 220;
 
 void fill(Preview& sheet, int left, int top, int right, int bottom, std::uint8_t value) {
@@ -28,7 +29,11 @@ void write(Preview& sheet, int left, int top, int width, std::string text) {
     float x, y, z;
     std::uint32_t colour;
   };
-  while (!text.empty() && stb_easy_font_width(text.data()) > width) text.pop_back();
+  const auto fits = [&](std::string label) { return stb_easy_font_width(label.data()) <= width; };
+  if (!fits(text)) {
+    while (!text.empty() && !fits(text + "..")) text.pop_back();
+    text += "..";
+  }
   std::vector<Corner> corners(4 * (text.size() * 20 + 16));
   const int quads = stb_easy_font_print(0, 0, text.data(), nullptr, corners.data(),
                                         static_cast<int>(corners.size() * sizeof(Corner)));
@@ -74,7 +79,7 @@ Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture
   std::size_t columns = plan.axes.size() > 1 ? plan.axes.back().values.size()
                                              : static_cast<std::size_t>(std::ceil(std::sqrt(count)));
   columns = std::clamp<std::size_t>(columns, 1, std::max<std::size_t>(count, 1));
-  int width = 0, height = 0;
+  int width = kLeastWidth, height = 0;
   std::size_t lines = 0;
   for (const SheetPicture& picture : pictures) {
     width = std::max(width, picture.thumbnail.width);

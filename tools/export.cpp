@@ -56,7 +56,7 @@ void add_export_commands(CLI::App& app, const std::string& command_line) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("import", "Make a cache from a point cloud that was exported");
   command->add_option("points", options->input, "Point cloud: .ply")->required();
-  command->add_option("-o,--output", options->output, "Cache file to write")->required();
+  command->add_option("-o,--output", options->output, "Cache file to write")->required()->check(not_empty());
   command->add_option("--like", options->like,
                       "Cache that the points come from, where their file has lost what they were baked from");
   add_common_options(*command, options->common);

@@ -29,6 +29,9 @@ std::vector<int> parse_frames(const std::string& text, const FilmPlan& film) {
 }  // namespace
 
 FilmPlan plan_film(const FilmOptions& options) {
+  const std::string ending = std::filesystem::path(options.contact_sheet).extension().string();
+  if (!options.contact_sheet.empty() && ending != ".png" && ending != ".PNG")
+    throw UsageError("--contact-sheet " + options.contact_sheet + ": it is a PNG; name it .png");
   if (options.turntable > 0 && !options.camera_path.empty())
     throw UsageError("give either --turntable or --camera-path");
   FilmPlan film;
@@ -81,6 +84,8 @@ std::string frame_path(const std::string& output, int frame) {
     length = digits = std::min(name.find_first_not_of('#', at), name.size()) - at;
   }
   if (at == std::string::npos) {
+    if (name.find('%') != std::string::npos)
+      throw UsageError("-o " + output + ": write the number of a frame as #### or %04d");
     at = path.stem().string().size();
     name.insert(at++, ".");
   }

@@ -55,6 +55,8 @@ void print_inversion(const Options& options) {
     medium.profile = static_cast<ProfileKind>(i);
     medium.int_ior = eta;
     medium.ext_ior = 1;
+    if (const std::string wrong = check_eta(medium.profile, double{eta}); !wrong.empty())
+      throw UsageError("--eta: " + wrong);
     const double largest = largest_albedo(medium.profile, double{eta});
     for (int k = 0; k < 3; ++k) {
       if (!(albedo[k] >= 0 && albedo[k] <= largest))

@@ -11,12 +11,14 @@ namespace {
 struct Options {
   CommonOptions common;
   std::vector<std::string> parts;
-  std::string output, exposure = "0";
+  std::string output, exposure = kExposure;
   bool png = false;
 };
 
 void run(const Options& options, const std::string& command_line) {
   const std::optional<double> exposure = parse_exposure(options.exposure);
+  if (options.exposure != kExposure && !options.png)
+    throw UsageError("--exposure is that of the preview: give --png");
   Session session(options.common, command_line);
   check_writable(options.output, options.parts);
   const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
@@ -43,7 +45,9 @@ void add_merge_command(CLI::App& app, const std::string& command_line) {
       "merge", "Put together a picture that was rendered in parts (render --tile, --crop)");
   command->add_option("parts", options->parts, "OpenEXR files that share out the pixels of one picture")
       ->required();
-  command->add_option("-o,--output", options->output, "OpenEXR file to write")->required();
+  command->add_option("-o,--output", options->output, "OpenEXR file to write")
+      ->required()
+      ->check(not_empty());
   command->add_flag("--png", options->png, "Write an sRGB preview beside it");
   command->add_option("--exposure", options->exposure, "Of the preview, in stops, or auto (default: 0)");
   add_common_options(*command, options->common);

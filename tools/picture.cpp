@@ -18,7 +18,7 @@ KeyValues make_conditions(const RenderOptions& options, const RenderParams& para
   for (const CacheGroup& group : cache.groups) conditions.emplace_back("samples", samples_digest(group));
   const auto add = [&](const char* name, const std::string& value) { conditions.emplace_back(name, value); };
   add("nacre", kVersion);
-  if (!is_mesh_file_name(options.scene.path)) add("scene", bytes_digest(read_text_file(options.scene.path)));
+  for (const std::string& source : scene.sources) add("scene", bytes_digest(read_text_file(source)));
   add("contents", contents_digest(scene));
   for (const std::string& define : options.scene.defines) add("define", define);
   add("mesh", fmt::format("{} {}", options.scene.material, options.scene.height.value_or(0)));

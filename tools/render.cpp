@@ -11,6 +11,7 @@
 #include "nacre/cache/exitance_file.h"
 #include "nacre/cache/fingerprint.h"
 #include "nacre/render/merge_images.h"
+#include "shell.h"
 
 namespace nacre::tools {
 namespace {
@@ -21,6 +22,7 @@ struct Options : RenderOptions {
   FilmOptions film;
   int verify = 0;
   bool png = false;
+  std::vector<std::string> words;  // what frames of a film depend on, as it was given
 };
 
 // Options that have nothing to act on are mistakes.
@@ -37,6 +39,8 @@ void check_combination(const Options& options) {
     throw UsageError("--exitance keeps what is interpolated; --tolerance 0 sums up every pixel by itself");
   if (!options.film.any() && !(options.film.frames.empty() && options.film.contact_sheet.empty()))
     throw UsageError("--frames and --contact-sheet are of a film: give --turntable N or --camera-path FILE");
+  if (options.exposure != kExposure && !options.png && options.film.contact_sheet.empty())
+    throw UsageError("--exposure is that of previews: give --png or --contact-sheet");
   if (options.film.any() && options.cameras.size() > 1)
     throw UsageError("a film is of one --camera, which --turntable or --camera-path moves");
 }
@@ -164,12 +168,7 @@ std::vector<Picture> find_missing(const Options& options, const FilmPlan& film, 
 
 // The same for a frame of a film whatever else the command renders, and wherever it writes.
 std::string describe_command(const Options& options, const Picture& picture, const Session& session) {
-  if (!options.film.any()) return session.command();
-  return fmt::format("nacre render {}{}{} ({})", options.scene.path,
-                     options.cache.empty() ? "" : " --cache " + options.cache,
-                     options.film.turntable > 0 ? fmt::format(" --turntable {}", options.film.turntable)
-                                                : " --camera-path " + options.film.camera_path,
-                     picture.label);
+  return options.film.any() ? quote_words(options.words) + " (" + picture.label + ")" : session.command();
 }
 
 // Of all that a part of a picture depends on but which part it is.
@@ -251,8 +250,8 @@ void render_pictures(const Options& options, const std::vector<Picture>& picture
 
 void run(const Options& options, const std::string& command_line) {
   const bool cached = uses_cache(method_of(options));
-  check_combination(options);
   const std::optional<double> exposure = parse_exposure(options.exposure);
+  check_combination(options);
   Session session(options.common, command_line);
   const std::optional<FilmPlan> film =
       options.film.any() ? std::optional(plan_film(options.film)) : std::nullopt;
@@ -302,7 +301,8 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->add_option("-o,--output", options->output,
                    "OpenEXR file to write; of a film each frame has its number in place "
                    "of #### or %04d, or before the ending")
-      ->required();
+      ->required()
+      ->check(not_empty());
   command
       ->add_option("--camera", options->cameras,
                    "Id of the camera (default: the first); several, one picture each, by commas or --camera "
@@ -310,11 +310,14 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
       ->check(not_empty())
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option(
-      "--tile", options->tile,
-      "K/N: render the K-th of N bands of the picture only; `nacre merge` puts them together");
-  command->add_option("--exitance", options->exitance,
-                      "Keep the diffusion that is evaluated in this file, and take it from there next time");
+  command
+      ->add_option("--tile", options->tile,
+                   "K/N: render the K-th of N bands of the picture only; `nacre merge` puts them together")
+      ->check(not_empty());
+  command
+      ->add_option("--exitance", options->exitance,
+                   "Keep the diffusion that is evaluated in this file, and take it from there next time")
+      ->check(not_empty());
   command
       ->add_option(
           "--verify", options->verify,
@@ -325,7 +328,12 @@ void add_render_command(CLI::App& app, const std::string& command_line) {
   add_render_options(*command, *options);
   add_bake_options(*command, options->bake);
   add_common_options(*command, options->common);
-  command->callback([options, command_line] { run(*options, command_line); });
+  command->callback([options, command, command_line] {
+    options->words = option_words(*command, {"output", "frames", "contact-sheet", "png", "exposure",
+                                             "exitance", "verify", "threads", "simd", "quiet", "report"});
+    options->words.insert(options->words.begin(), {"nacre", "render"});
+    run(*options, command_line);
+  });
 }
 
 }  // namespace nacre::tools

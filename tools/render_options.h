@@ -14,7 +14,7 @@ struct RenderOptions {
   CommonOptions common;
   SceneOptions scene;
   BakeOptions bake;
-  std::string cache, size, crop, method = "hierarchical", aovs = "all", exposure = "0";
+  std::string cache, size, crop, method = "hierarchical", aovs = "all", exposure = kExposure;
   std::vector<std::string> lights;
   int samples_per_pixel = 0;
   std::optional<double> tolerance;

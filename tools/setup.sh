@@ -21,7 +21,7 @@ esac
 packages=(
   g++ cmake ninja-build ccache pkg-config time
   libembree-dev libopenmesh-dev libflann-dev liblz4-dev libopenexr-dev libimath-dev libtbb-dev libhwy-dev
-  libpugixml-dev libcli11-dev nlohmann-json3-dev libfmt-dev zlib1g-dev libxxhash-dev libstb-dev libgtest-dev
+  libpugixml-dev libcli11-dev nlohmann-json3-dev libfmt-dev zlib1g-dev libxxhash-dev libstb-dev libeigen3-dev libgtest-dev
   libbenchmark-dev
 )
 if [[ "${1:-}" == --tests ]]; then

@@ -102,6 +102,8 @@ SweepAxis parse_axis(const std::string& text) {
     const double at = *count == 1 ? 0 : static_cast<double>(i) / (*count - 1);
     const double value = logarithmic ? *first * std::pow(*last / *first, at) : *first + (*last - *first) * at;
     axis.values.push_back(make_setting(axis.name, fmt::format("{:.7g}", value)));
+    if (i > 0 && axis.values[static_cast<std::size_t>(i) - 1].value == axis.values.back().value)
+      wrong("steps are smaller than seven digits show");
   }
   return axis;
 }

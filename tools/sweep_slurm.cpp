@@ -205,16 +205,8 @@ std::vector<std::string> find_words(const CLI::App& command) {
   const std::set<std::string> own{"engine", "shards", "retries", "slurm-option", "report", "quiet", "simd"};
   std::vector<std::string> words{std::filesystem::read_symlink("/proc/self/exe").string(),
                                  command.get_name()};
-  for (const CLI::Option* const option : command.get_options()) {
-    if (option->count() == 0 || own.contains(option->get_single_name())) continue;
-    const std::string name = option->nonpositional() ? option->get_name() : "";
-    if (option->get_expected_max() == 0)
-      words.push_back(name);
-    else
-      for (const std::string& value : option->results())
-        words.push_back(name.empty() ? value
-                                     : fmt::format("{}{}{}", name, name.starts_with("--") ? "=" : "", value));
-  }
+  const std::vector<std::string> given = option_words(command, own);
+  words.insert(words.end(), given.begin(), given.end());
   words.push_back("--simd=" + simd_target());
   return words;
 }

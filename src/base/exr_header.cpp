@@ -140,8 +140,9 @@ std::int64_t lines_per_chunk(int compression, Cursor& cursor) {
 // No compression makes more of a byte than this: runs of 127, deflate's 1032 to 1 (twice over where runs come
 // first), blocks of 4 x 4 halves in 3 bytes.
 std::uint64_t most_per_byte(int compression) {
-  constexpr std::array<std::uint64_t, 10> kMost{1,        128, 1032, 1032,      16 * 1032,
-                                                2 * 1032, 16,  16,   64 * 1032, 64 * 1032};
+  constexpr std::uint64_t kDeflate = 1032;
+  constexpr std::array<std::uint64_t, 10> kMost{
+      1, 128, kDeflate, kDeflate, 16 * kDeflate, 2 * kDeflate, 16, 16, 64 * kDeflate, 64 * kDeflate};
   return kMost[static_cast<std::size_t>(compression)];
 }
 

@@ -48,7 +48,7 @@ struct Exitance::Room {
   SourceList list;
   std::vector<Limits> limits;  // of the target at hand
   std::vector<double> totals;  // of a point
-  std::vector<float> far;
+  std::vector<float> far, combined;
   std::uint64_t evaluations = 0;
 };
 
@@ -127,7 +127,7 @@ void Exitance::make_limits(const Target& target, Room& room) const {
 void Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
   const Vec3& x = room.points[point.index];
   Rgb* const values = &room.exitance[point.index * material_count_];
-  room.evaluations += material_count_ * room.list.size();
+  room.evaluations += kernel_count_ * room.list.size();
   if (!set_) {
     const Float4 far = target.far.eval(x - target.centre);
     std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
@@ -140,9 +140,20 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   target.set_far.eval(x - target.centre, room.far);
   room.totals.assign(room.far.begin(), room.far.end());
   lanes::add_sources(*set_, room.list, x, room.totals);
-  for (std::size_t m = 0; m < material_count_; ++m)
-    for (std::size_t k = 0; k < 3; ++k)
-      values[m][static_cast<int>(k)] = static_cast<float>(std::max(room.totals[k * set_->padded() + m], 0.0));
+  for (int k = 0; k < 3; ++k) {
+    const double* const totals = room.totals.data() + static_cast<std::size_t>(k) * set_->padded();
+    if (weights_.empty()) {
+      for (std::size_t m = 0; m < material_count_; ++m)
+        values[m][k] = static_cast<float>(std::max(totals[m], 0.0));
+      continue;
+    }
+    room.combined.assign(material_count_, 0.0f);
+    const float* weights = weights_.data() + static_cast<std::size_t>(k) * kernel_count_ * material_count_;
+    for (std::size_t j = 0; j < kernel_count_; ++j, weights += material_count_)
+      for (std::size_t m = 0; m < material_count_; ++m)
+        room.combined[m] += weights[m] * static_cast<float>(totals[j]);
+    for (std::size_t m = 0; m < material_count_; ++m) values[m][k] = std::max(room.combined[m], 0.0f);
+  }
 }
 
 // Sums up for the points of one block or cell, which follow each other.
@@ -220,7 +231,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     add_far(*set_, target.set_far);
   else
     add_far(kernels_[0].tables(), target.far);
-  room.evaluations += material_count_ * (nodes.far.size() + nodes.far_samples.size());
+  room.evaluations += kernel_count_ * (nodes.far.size() + nodes.far_samples.size());
 
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
@@ -266,7 +277,7 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
   });
-  Room room{places, exitance, whole, {}, {}, {}, {}, {}, {}, 0};
+  Room room{places, exitance, whole, {}, {}, {}, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)

@@ -5,6 +5,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <cstring>
 #include <numeric>
 #include <utility>
 
@@ -16,8 +17,6 @@ namespace {
 
 enum BlockState : std::uint8_t { kEmpty, kBusy, kFull };
 
-Rgb to_rgb(Float4 v) noexcept { return {v[0], v[1], v[2]}; }
-Float4 to_float4(const Rgb& v) noexcept { return Float4{v.x, v.y, v.z, 0}; }
 Float4 larger(Float4 a, Float4 b) noexcept { return a > b ? a : b; }
 Float4 magnitude(Float4 x) noexcept { return larger(x, -x); }
 
@@ -72,13 +71,23 @@ ExitanceField::Patch ExitanceField::patch(const Part& part) const noexcept {
 void ExitanceField::fetch_nodes(const Part& part) const noexcept {
   constexpr std::size_t kLine = 64 / sizeof(Float4);
   const auto fetch = [&](std::uint32_t node) {
-    for (std::size_t m = 0; m < materials_; m += kLine) __builtin_prefetch(values(node) + m);
+    for (std::size_t q = 0; q < quads_; q += kLine) __builtin_prefetch(values(node) + q);
   };
   if (!is_kind(part, kCurved)) {
     for (const std::uint32_t node : part.data) fetch(node);
   } else {
     for (const std::uint32_t node : patches_[part.data[0]].nodes) fetch(node != kNone ? node : 0);
   }
+}
+
+// What is beyond the last material is zero.
+void ExitanceField::store(std::uint32_t node, const Rgb* materials) const noexcept {
+  values(node)[quads_ - 1] = broadcast(0);
+  std::memcpy(values(node), materials, materials_ * sizeof(Rgb));
+}
+
+void ExitanceField::unpack(const Float4* packed, Rgb* materials) const noexcept {
+  std::memcpy(static_cast<void*>(materials), packed, materials_ * sizeof(Rgb));
 }
 
 // Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.
@@ -89,10 +98,12 @@ void ExitanceField::fill_blocks(std::span<const std::uint32_t> blocks, std::uint
                      positions_.begin() + block_begin_[block + 1]);
   std::vector<Rgb> results(positions.size() * materials_);
   exitance_.eval_whole(positions, results, evaluations);
-  auto result = results.begin();
+  const Rgb* result = results.data();
   for (const std::uint32_t block : blocks) {
-    for (Float4* to = values(block_begin_[block]); to != values(block_begin_[block + 1]); ++to)
-      *to = to_float4(*result++);
+    for (std::uint32_t node = block_begin_[block]; node < block_begin_[block + 1]; ++node) {
+      store(node, result);
+      result += materials_;
+    }
     block_state_[block].store(kFull, std::memory_order_release);
     block_state_[block].notify_all();
   }
@@ -137,12 +148,12 @@ std::string ExitanceField::nodes_digest() const {
 KeptExitance ExitanceField::keep() const {
   KeptExitance kept;
   kept.filled.resize(block_begin_.size() - 1);
-  kept.values.resize(values_.size(), Rgb(0, 0, 0));
+  kept.values.resize(positions_.size() * materials_, Rgb(0, 0, 0));
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {
     if (block_state_[block].load(std::memory_order_acquire) != kFull) continue;
     kept.filled[block] = 1;
-    for (std::size_t i = block_begin_[block] * materials_; i < block_begin_[block + 1] * materials_; ++i)
-      kept.values[i] = to_rgb(values_[i]);
+    for (std::uint32_t node = block_begin_[block]; node < block_begin_[block + 1]; ++node)
+      unpack(values(node), &kept.values[node * materials_]);
   }
   return kept;
 }
@@ -150,8 +161,8 @@ KeptExitance ExitanceField::keep() const {
 void ExitanceField::restore(const KeptExitance& kept) const {
   for (std::size_t block = 0; block < kept.filled.size(); ++block) {
     if (!kept.filled[block]) continue;
-    for (std::size_t i = block_begin_[block] * materials_; i < block_begin_[block + 1] * materials_; ++i)
-      values_[i] = to_float4(kept.values[i]);
+    for (std::uint32_t node = block_begin_[block]; node < block_begin_[block + 1]; ++node)
+      store(node, &kept.values[node * materials_]);
     block_state_[block].store(kFull, std::memory_order_release);
   }
 }
@@ -173,29 +184,29 @@ void ExitanceField::judge(Part& part) const noexcept {
 
 bool ExitanceField::is_steep(const Patch& patch) const noexcept {
   const auto exceeds = [](Float4 x, Float4 most) {
-    return x[0] > most[0] || x[1] > most[1] || x[2] > most[2];
+    return x[0] > most[0] || x[1] > most[1] || x[2] > most[2] || x[3] > most[3];
   };
   for (std::size_t i = 0; i < 3; ++i) {
     const Float4 *const from = values(patch.nodes[i]), *const to = values(patch.nodes[(i + 1) % 3]);
     const Float4* const between = patch.nodes[3 + i] != kNone ? values(patch.nodes[3 + i]) : nullptr;
-    for (std::size_t m = 0; m < materials_; ++m) {
-      const Float4 a = from[m], b = to[m], mean = (a + b) * broadcast(0.5f);
+    for (std::size_t q = 0; q < quads_; ++q) {
+      const Float4 a = from[q], b = to[q], mean = (a + b) * broadcast(0.5f);
       if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
       if (!between) continue;
-      const Float4 middle = between[m];
+      const Float4 middle = between[q];
       if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(most_bend_))) return true;
     }
   }
   return false;
 }
 
-Float4 ExitanceField::interpolate(const Patch& patch, float u, float v, std::size_t m) const noexcept {
+Float4 ExitanceField::interpolate(const Patch& patch, float u, float v, std::size_t quad) const noexcept {
   const float w = 1 - u - v;
-  const Float4 a = values(patch.nodes[0])[m], b = values(patch.nodes[1])[m], c = values(patch.nodes[2])[m];
+  const auto at = [&](std::size_t i) { return values(patch.nodes[i])[quad]; };
+  const Float4 a = at(0), b = at(1), c = at(2);
   Float4 value = a * broadcast(w) + b * broadcast(u) + c * broadcast(v);
   const auto bend = [&](std::size_t middle, Float4 from, Float4 to, float bump) {
-    if (patch.nodes[middle] != kNone)
-      value += (values(patch.nodes[middle])[m] - (from + to) * broadcast(0.5f)) * broadcast(bump);
+    if (patch.nodes[middle] != kNone) value += (at(middle) - (from + to) * broadcast(0.5f)) * broadcast(bump);
   };
   bend(3, a, b, 4 * w * u);
   bend(4, b, c, 4 * u * v);
@@ -209,10 +220,13 @@ bool ExitanceField::look_up(const Place& place, Rgb* to) const noexcept {
   const auto& [a, b, c] = parts_[place.part].data;
   const float u = place.u, v = place.v;
   if (mark & kSteep) return false;
-  for (std::size_t m = 0; m < materials_; ++m)
-    to[m] = to_rgb(mark & kCurved ? interpolate(patches_[a], u, v, m)
-                                  : values(a)[m] * broadcast(1 - u - v) + values(b)[m] * broadcast(u) +
-                                        values(c)[m] * broadcast(v));
+  for (std::size_t q = 0; q < quads_; ++q) {
+    const Float4 value = mark & kCurved ? interpolate(patches_[a], u, v, q)
+                                        : values(a)[q] * broadcast(1 - u - v) + values(b)[q] * broadcast(u) +
+                                              values(c)[q] * broadcast(v);
+    float* const out = &to->x + 4 * q;
+    std::memcpy(out, &value, std::min<std::size_t>(4, 3 * materials_ - 4 * q) * sizeof(float));
+  }
   return true;
 }
 

@@ -192,6 +192,7 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
                              double tolerance)
     : exitance_(exitance),
       materials_(exitance.material_count()),
+      quads_((3 * materials_ + 3) / 4),
       meshes_(std::move(meshes)),
       most_bend_(static_cast<float>(0.05 * std::pow(strictness(tolerance), 2.0 / 3))),
       most_change_(static_cast<float>(0.4 * std::sqrt(strictness(tolerance)))) {
@@ -200,7 +201,7 @@ ExitanceField::ExitanceField(std::vector<const Mesh*> meshes, const Exitance& ex
     if (mesh) vertices += mesh->positions.size();
   positions_.reserve(2 * vertices);
   divide_meshes(distance);
-  values_ = LargeArray<Float4>(positions_.size() * materials_);
+  values_ = LargeArray<Float4>(positions_.size() * quads_);
   block_state_ = std::make_unique<std::atomic<std::uint8_t>[]>(block_begin_.size());
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cache/kernel_set.h"
+#include "cache/kernel_span.h"
 #include "cache/morton.h"
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
@@ -34,6 +35,9 @@ constexpr double kRounding = 3e-5;
 
 // From this tolerance on, tables are read without interpolation.
 constexpr double kMiddlesTolerance = 0.005;
+
+// Of the tolerance, what a few kernels may miss those of a family by.
+constexpr double kSpanShare = 0.05;
 
 constexpr float kNoLimit = 1e30f;
 
@@ -89,8 +93,7 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
   }
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance)
     for (Kernel& kernel : kernels_) kernel.make_middles();
-  if (family.media.size() > 1)
-    set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
+  if (family.media.size() > 1) make_set(family, tolerance, size.length());
   copy_octree();
   add_all_moments();
   make_tables();
@@ -147,6 +150,32 @@ void Exitance::make_kernels(const MaterialFamily& family) {
   // half.
   if (promise_ == Promise::kCalibrated)
     own_share_ = 1 / (1 + 0.4 * std::pow(fastest * double{unit_} * shortest_length(family.media), 6));
+}
+
+// Many materials are combinations of a few kernels. Those are of the whole family, whatever is wanted of it.
+void Exitance::make_set(const MaterialFamily& family, double tolerance, double farthest) {
+  kernel_count_ = material_count_;
+  std::optional<KernelSpan> span;
+  std::vector<std::array<Profile, 3>> profiles;
+  if (promise_ == Promise::kCalibrated) {
+    for (const Medium& medium : family.media)
+      profiles.push_back(resolved_profiles(in_units(medium, unit_), spacing_));
+    span = find_span(profiles, farthest, kSpanShare * tolerance, KernelSet::kLanes);
+  }
+  if (!span) {
+    set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
+    return;
+  }
+  kernel_count_ = span->basis.size();
+  std::vector<Kernel> kernels;
+  for (const ChannelChoice& choice : span->basis) {
+    kernels.emplace_back(std::array{profiles[choice[0]][0], profiles[choice[1]][1], profiles[choice[2]][2]});
+    if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
+  }
+  set_ = std::make_unique<const KernelSet>(kernels);
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t j = 0; j < kernel_count_; ++j)
+      for (const std::uint32_t material : family.wanted) weights_.push_back(span->weights[material][j][k]);
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

@@ -6,6 +6,7 @@
 
 #include "cache/sum_lanes.h"
 #include "nacre/cache/kernel.h"
+#include "nacre/cache/material_family.h"
 
 namespace nacre {
 
@@ -26,7 +27,7 @@ class KernelSet {
   const DistanceBins& jet_bins() const noexcept { return jet_bins_; }
 
   /// Lanes that are processed together, of which `padded` is a multiple.
-  static constexpr std::size_t kLanes = 8;
+  static constexpr std::size_t kLanes = kFewMaterials;
 
  private:
   std::size_t padded_;

@@ -14,12 +14,40 @@ namespace nacre {
 namespace {
 
 constexpr float kAbsorbing = 0.8f;  // albedo below which much is absorbed
+// Within a family, by what factors mean free paths differ, and distances in them over which light falls to
+// 1/e.
+constexpr double kLengths = 1.4143, kFalls = 1.5;
 
 auto family_key(const Medium& medium) {
-  const double octaves = std::log2(shortest_length(std::span(&medium, 1)));
-  const auto half_octaves = static_cast<int>(std::floor(std::clamp(2 * octaves, -4000.0, 4000.0)));
-  return std::tuple(half_octaves, absorbs_much(medium), medium.profile, medium.eta(), medium.lambert,
-                    medium.convention);
+  return std::tuple(medium.profile, medium.eta(), medium.lambert, medium.convention);
+}
+
+double length_of(const Medium& medium) { return shortest_length(std::span(&medium, 1)); }
+
+// Of the channel that absorbs most, about sigma_tr l'; no less than for an albedo of kAbsorbing, from where
+// on it hardly matters.
+double fall_of(const Medium& medium) {
+  return std::sqrt(3 * (1 - std::min(kAbsorbing, min_channel(reduce(medium).alpha_prime))));
+}
+
+using Indices = std::vector<std::size_t>;
+
+// Parts within each of which a measure differs by at most `factor`, from the least on.
+template <class Measure>
+std::vector<Indices> split(const std::vector<Indices>& groups, double factor, const Measure& measure) {
+  std::vector<Indices> parts;
+  for (Indices group : groups) {
+    std::ranges::stable_sort(group, {}, measure);
+    double least = 0;
+    for (const std::size_t i : group) {
+      if (i == group[0] || !(measure(i) <= factor * least)) {
+        parts.emplace_back();
+        least = measure(i);
+      }
+      parts.back().push_back(i);
+    }
+  }
+  return parts;
 }
 
 }  // namespace
@@ -34,15 +62,26 @@ double shortest_length(std::span<const Medium> media) {
 bool absorbs_much(const Medium& medium) { return min_channel(reduce(medium).alpha_prime) < kAbsorbing; }
 
 MaterialFamilies sort_materials(std::span<const Medium> media) {
+  std::map<decltype(family_key(media[0])), std::size_t> keys;
+  std::vector<Indices> groups;
+  for (std::size_t i = 0; i < media.size(); ++i) {
+    const std::size_t at = keys.try_emplace(family_key(media[i]), groups.size()).first->second;
+    if (at == groups.size()) groups.emplace_back();
+    groups[at].push_back(i);
+  }
+  groups = split(groups, kLengths, [&](std::size_t i) { return length_of(media[i]); });
+  // From the strictest on.
+  groups = split(groups, kFalls, [&](std::size_t i) { return 1 / fall_of(media[i]); });
   MaterialFamilies result;
-  std::map<decltype(family_key(media[0])), std::uint32_t> families;
-  for (const Medium& medium : media) {
-    const auto next = static_cast<std::uint32_t>(result.families.size());
-    const std::uint32_t family = families.try_emplace(family_key(medium), next).first->second;
-    if (family == next) result.families.push_back({{}, {}});
-    std::vector<Medium>& members = result.families[family].media;
-    result.places.push_back({family, static_cast<std::uint32_t>(members.size())});
-    members.push_back(medium);
+  result.places.resize(media.size());
+  for (const Indices& group : groups) {
+    std::vector<Medium>& members = result.families.emplace_back().media;
+    result.families.back().wanted.clear();
+    for (const std::size_t i : group) {
+      result.places[i] = {static_cast<std::uint32_t>(result.families.size() - 1),
+                          static_cast<std::uint32_t>(members.size())};
+      members.push_back(media[i]);
+    }
   }
   for (const MaterialFamily& family : result.families) result.digests.push_back(family_digest(family));
   return result;
@@ -82,18 +121,44 @@ std::array<Rgb, 2> find_extinctions(std::span<const Medium> media) {
   return range;
 }
 
+std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medium> media) {
+  const auto sigma_t = [&](std::size_t i) { return (media[i].sigma_s + media[i].sigma_a) * media[i].scale; };
+  const auto is_near = [](const Rgb& a, const Rgb& b) {
+    for (int k = 0; k < 3; ++k)
+      if (!(std::max(a[k], b[k]) <= static_cast<float>(kLengths) * std::min(a[k], b[k]))) return false;
+    return true;
+  };
+  std::vector<std::vector<std::uint32_t>> groups;
+  for (std::uint32_t i = 0; i < media.size(); ++i) {
+    const auto group =
+        std::ranges::find_if(groups, [&](const auto& g) { return is_near(sigma_t(g[0]), sigma_t(i)); });
+    if (group == groups.end())
+      groups.push_back({i});
+    else
+      group->push_back(i);
+  }
+  return groups;
+}
+
 std::string family_digest(const MaterialFamily& family) {
   KeyValues values;
+  const auto add = [&](const Medium& medium, int k) {
+    const Reduced reduced = reduce(medium);
+    values.emplace_back(fmt::format("channel {}", k),
+                        fmt::format("{} {} {} {} {}", reduced.sigma_s_prime[k], reduced.sigma_t_prime[k],
+                                    medium.scale, medium.eta(), static_cast<int>(medium.profile)));
+  };
   for (const ChannelChoice& choice : find_extremes(family.media))
-    for (int k = 0; k < 3; ++k) {
-      const Medium& medium = family.media[choice[static_cast<std::size_t>(k)]];
-      const Reduced reduced = reduce(medium);
-      values.emplace_back(fmt::format("channel {}", k),
-                          fmt::format("{} {} {} {} {}", reduced.sigma_s_prime[k], reduced.sigma_t_prime[k],
-                                      medium.scale, medium.eta(), static_cast<int>(medium.profile)));
-    }
-  for (const Rgb& sigma_t : find_extinctions(family.media))
-    values.emplace_back("sigma_t", fmt::format("{} {} {}", sigma_t.x, sigma_t.y, sigma_t.z));
+    for (int k = 0; k < 3; ++k) add(family.media[choice[static_cast<std::size_t>(k)]], k);
+  if (family.media.size() > kFewMaterials)
+    for (const Medium& medium : family.media)
+      for (int k = 0; k < 3; ++k) add(medium, k);
+  for (const std::vector<std::uint32_t>& group : group_by_extinction(family.media)) {
+    std::vector<Medium> members;
+    for (const std::uint32_t i : group) members.push_back(family.media[i]);
+    for (const Rgb& sigma_t : find_extinctions(members))
+      values.emplace_back("sigma_t", fmt::format("{} {} {}", sigma_t.x, sigma_t.y, sigma_t.z));
+  }
   return fingerprint_digest(values);
 }
 

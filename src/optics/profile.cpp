@@ -1,6 +1,8 @@
 // The three profiles as sums of point-source terms.
 #include "nacre/optics/profile.h"
 
+#include <fmt/format.h>
+
 #include "nacre/optics/fresnel.h"
 
 namespace nacre {
@@ -29,6 +31,15 @@ double boundary_factor(double eta) {
 }
 
 }  // namespace
+
+std::string check_eta(ProfileKind profile, double eta) {
+  if (profile == ProfileKind::kBetterDipole || (eta >= kLeastDipoleEta && eta <= kLargestDipoleEta))
+    return "";
+  return fmt::format(
+      "the profile '{}' holds for relative indices of refraction from {} to {}, not {:g}; take "
+      "betterdipole",
+      kProfileNames[static_cast<std::size_t>(profile)], kLeastDipoleEta, kLargestDipoleEta, eta);
+}
 
 double eval_profile(const Profile& profile, double r) noexcept {
   double sum = 0;

@@ -28,7 +28,7 @@ std::string image_digest(const Image& image) {
 
 Seal check_seal(const Image& image) {
   const auto seal = image.metadata.find(kDigestKey);
-  if (seal == image.metadata.end()) return Seal::kNone;
+  if (seal == image.metadata.end()) return Seal::kAbsent;
   return seal->second == image_digest(image) ? Seal::kSound : Seal::kBroken;
 }
 

@@ -1,4 +1,6 @@
 // PNG previews: exposure, the sRGB curve, eight bits.
+#include <zlib.h>
+
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
@@ -8,6 +10,25 @@
 #include "nacre/render/image_file.h"
 #include "render/image_check.h"
 
+namespace {
+
+// zlib for stb: several times as fast as its own at the same size.
+unsigned char* deflate_for_stb(unsigned char* data, int bytes, int* compressed_bytes, int /*quality*/) {
+  constexpr int kLevel = 4;
+  uLongf size = compressBound(static_cast<uLong>(bytes));
+  auto* const compressed = static_cast<unsigned char*>(std::malloc(size));
+  if (!compressed) return nullptr;
+  if (compress2(compressed, &size, data, static_cast<uLong>(bytes), kLevel) != Z_OK) {
+    std::free(compressed);
+    return nullptr;
+  }
+  *compressed_bytes = static_cast<int>(size);
+  return compressed;
+}
+
+}  // namespace
+
+#define STBIW_ZLIB_COMPRESS deflate_for_stb
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
 #define STBI_WRITE_NO_STDIO

@@ -79,7 +79,12 @@ struct SingleScattering::Impl {
     Rgb g;
   };
   std::vector<Material> materials;
-  std::vector<float> rates;  // of free flights
+  // What shares points and connections.
+  struct Group {
+    std::vector<float> rates;            // of free flights
+    std::vector<std::uint32_t> members;  // materials
+  };
+  std::vector<Group> groups;
   float eta;
   bool conserving;
 
@@ -101,8 +106,8 @@ struct SingleScattering::Impl {
 
   // Adds what reaches `at` from one light sample, per unit of scattering: attenuated irradiance times the
   // phase function.
-  void connect(const InteriorPoint& at, const Vec3& inward, const LightSample& sample, InteriorRoom& room,
-               LostSamples& lost, std::span<Rgb> arriving) const {
+  void connect(const Group& group, const InteriorPoint& at, const Vec3& inward, const LightSample& sample,
+               InteriorRoom& room, LostSamples& lost, std::span<Rgb> arriving) const {
     if (is_black(sample.irradiance)) return;
     const LightSegment segment = interior.trace_light(at, sample, room);
     ++lost.taken;
@@ -112,7 +117,7 @@ struct SingleScattering::Impl {
     const float cosine = std::clamp(dot(segment.direction, inward), -1.0f, 1.0f);
     Rgb factor = segment.transmittance;
     if (conserving) factor *= segment.cos_entry / (eta * eta * segment.cos_refracted);
-    for (std::size_t i = 0; i < materials.size(); ++i) {
+    for (const std::uint32_t i : group.members) {
       const Material& m = materials[i];
       for (int k = 0; k < 3; ++k)
         arriving[i][k] += sample.irradiance[k] * factor[k] * std::exp(-m.sigma_t[k] * segment.length) *
@@ -129,12 +134,23 @@ SingleScattering::SingleScattering(const World& world, std::size_t medium, const
     const Medium& m = family.media[index];
     impl.materials.push_back({m.sigma_s * m.scale, sigma_t(m), m.g});
   }
-  const auto [thinnest, densest] = find_extinctions(family.media);
-  for (int k = 0; k < 3; ++k)
-    for (const float factor : {1.0f, 2.0f}) {
-      if (thinnest[k] > 0) impl.rates.push_back(thinnest[k] * factor);
-      if (densest[k] > thinnest[k]) impl.rates.push_back(densest[k] * factor);
+  for (const std::vector<std::uint32_t>& alike : group_by_extinction(family.media)) {
+    Impl::Group group;
+    std::vector<Medium> members;
+    for (const std::uint32_t index : alike) {
+      members.push_back(family.media[index]);
+      const auto wanted = std::ranges::find(family.wanted, index);
+      if (wanted != family.wanted.end())
+        group.members.push_back(static_cast<std::uint32_t>(wanted - family.wanted.begin()));
     }
+    const auto [thinnest, densest] = find_extinctions(members);
+    for (int k = 0; k < 3; ++k)
+      for (const float factor : {1.0f, 2.0f}) {
+        if (thinnest[k] > 0) group.rates.push_back(thinnest[k] * factor);
+        if (densest[k] > thinnest[k]) group.rates.push_back(densest[k] * factor);
+      }
+    if (!group.members.empty()) impl.groups.push_back(std::move(group));
+  }
   impl_ = std::make_unique<const Impl>(std::move(impl));
 }
 SingleScattering::~SingleScattering() = default;
@@ -162,31 +178,32 @@ void SingleScattering::estimate(const SurfacePoint& point, const Vec3& out, int 
   const ViewSegment view = m.interior.trace_view(point, out, inward, room);
   ++lost.taken;
   lost.lost += view.lost;
-  const FreeFlight flight(m.rates, view.length);
-  if (!flight.possible()) return;
-
   std::vector<Rgb> arriving(m.materials.size());
-  for (int i = 0; i < samples; ++i) {
-    const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
-    const Vec3 u = sobol_3d(index, key);
-    const auto distance = static_cast<float>(flight.sample(double{u.x}));
-    const InteriorPoint at = view.at(distance);
-    std::ranges::fill(arriving, Rgb(0, 0, 0));
-    const auto gather = [&](const Connection& connection) {
-      m.connect(at, inward, connection.sample, room, lost, arriving);
-    };
-    const std::size_t lights = m.world.scene->lights.size();
-    if (lights > kMaxConnectedLights)
-      for_each_connection(m.world, at.position, kNoNormal, 1, key, index, gather);
-    else  // the same point of every light: what it has to be spread evenly with is the distance
-      for (std::size_t light = 0; light < lights; ++light)
-        gather(connect_to_light(m.world, light, at.position, kNoNormal, {u.y, u.z}, 1));
-    const auto pdf = static_cast<float>(flight.pdf(double{distance}));
-    for (std::size_t j = 0; j < m.materials.size(); ++j) {
-      const Impl::Material& material = m.materials[j];
-      for (int k = 0; k < 3; ++k)
-        radiance[j][k] +=
-            arriving[j][k] * material.sigma_s[k] * std::exp(-material.sigma_t[k] * distance) / pdf;
+  for (const Impl::Group& group : m.groups) {
+    const FreeFlight flight(group.rates, view.length);
+    if (!flight.possible()) continue;
+    for (int i = 0; i < samples; ++i) {
+      const std::uint32_t index = first_sample + static_cast<std::uint32_t>(i);
+      const Vec3 u = sobol_3d(index, key);
+      const auto distance = static_cast<float>(flight.sample(double{u.x}));
+      const InteriorPoint at = view.at(distance);
+      std::ranges::fill(arriving, Rgb(0, 0, 0));
+      const auto gather = [&](const Connection& connection) {
+        m.connect(group, at, inward, connection.sample, room, lost, arriving);
+      };
+      const std::size_t lights = m.world.scene->lights.size();
+      if (lights > kMaxConnectedLights)
+        for_each_connection(m.world, at.position, kNoNormal, 1, key, index, gather);
+      else  // the same point of every light: what it has to be spread evenly with is the distance
+        for (std::size_t light = 0; light < lights; ++light)
+          gather(connect_to_light(m.world, light, at.position, kNoNormal, {u.y, u.z}, 1));
+      const auto pdf = static_cast<float>(flight.pdf(double{distance}));
+      for (const std::uint32_t j : group.members) {
+        const Impl::Material& material = m.materials[j];
+        for (int k = 0; k < 3; ++k)
+          radiance[j][k] +=
+              arriving[j][k] * material.sigma_s[k] * std::exp(-material.sigma_t[k] * distance) / pdf;
+      }
     }
   }
   for (Rgb& value : radiance) value *= transmittance / static_cast<float>(samples);

@@ -1,5 +1,6 @@
 // <subsurface type="dipole">: coefficients, presets, indices of refraction.
 #include "nacre/optics/invert_albedo.h"
+#include "nacre/optics/profile.h"
 #include "scene/elements.h"
 #include "scene/parameters.h"
 
@@ -119,6 +120,8 @@ MediumElement read_medium(const XmlElement& element, const TextureIndex& texture
     medium.ext_ior = ior.outside;
   }
   medium.profile = read_profile(parameters);
+  if (const std::string wrong = check_eta(medium.profile, double{medium.eta()}); !wrong.empty())
+    fail(ErrorCode::kValue, element.place(), "{}", wrong);
   medium.convention = static_cast<Convention>(parameters.choice("convention", {"published", "conserving"}));
   medium.lambert = parameters.boolean("lambert", false);
 

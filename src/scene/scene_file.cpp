@@ -377,6 +377,7 @@ Scene load_scene(const std::string& path, const Defines& defines, SceneFiles fil
   scene.path = path;
   SceneXml xml = load_scene_xml(path, defines, scene.warnings, files);
   Builder(scene, xml.scene).build();
+  scene.sources = std::move(xml.sources);
   scene.files = std::move(xml.files);
   return scene;
 }

@@ -125,7 +125,7 @@ class Loader {
     if (open_files_.size() >= kMaxDepth)
       fail(ErrorCode::kLimit, included_from, "includes are nested more than {} deep", kMaxDepth);
     open_files_.push_back(identity);
-    files_.insert(path);
+    sources_.insert(path);
 
     const Source source(path, text);
     if (const std::size_t nul = text.find('\0'); nul != std::string::npos)
@@ -153,6 +153,7 @@ class Loader {
   }
 
   bool is_used(const std::string& name) const { return used_.contains(name); }
+  std::vector<std::string> sources() const { return {sources_.begin(), sources_.end()}; }
   std::vector<std::string> files() const { return {files_.begin(), files_.end()}; }
 
  private:
@@ -181,7 +182,7 @@ class Loader {
 
   Defines values_;
   std::string sandbox_;
-  std::set<std::string> used_, files_;
+  std::set<std::string> used_, sources_, files_;
   std::vector<std::string> open_files_;
   std::size_t tree_bytes_ = 0, file_count_ = 0;
 };
@@ -269,6 +270,7 @@ SceneXml load_scene_xml(const std::string& path, const Defines& defines, Warning
   Loader loader(defines, sandbox);
   SceneXml result;
   loader.load(path, "", result.scene);
+  result.sources = loader.sources();
   result.files = loader.files();
   for (const auto& [name, value] : defines)
     if (!loader.is_used(name))

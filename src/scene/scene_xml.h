@@ -28,7 +28,8 @@ struct XmlElement {
 
 struct SceneXml {
   XmlElement scene;
-  std::vector<std::string> files;  // the file, what it includes, and what its elements name; none twice
+  std::vector<std::string> sources;  // the file and what it includes, none twice
+  std::vector<std::string> files;    // that their elements name, none twice
 };
 
 /// Reads a file and what it includes into one <scene>. Throws Error with "file:line" for what is not XML, an

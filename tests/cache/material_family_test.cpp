@@ -113,26 +113,51 @@ TEST(MaterialFamily, BelongsTogetherWhatIsAlike) {
   add([](Medium& m) { m.sigma_s *= 4.0f; });
   add([](Medium& m) { m.int_ior = 1.7f; });
   add([](Medium& m) { m.profile = ProfileKind::kNormalized; });
-  add([](Medium& m) { m.sigma_a = m.sigma_s; });
-  add([](Medium& m) { m.scale *= 3; });
+  add([](Medium& m) {
+    m.sigma_a = m.sigma_s * 0.9f;
+    m.sigma_s *= 0.1f;
+  });
+  add([](Medium& m) { m.scale *= 0.2f; });
   add([](Medium&) {});
   const MaterialFamilies sorted = sort_materials(plan);
   EXPECT_EQ(sorted.families.size(), 6u);
-  EXPECT_EQ(sorted.families[0].media.size(), 3u);
-  EXPECT_EQ(sorted.places[7].family, 0u);
-  EXPECT_EQ(sorted.places[7].index, 2u);
-  EXPECT_TRUE(sorted.families[0].wanted.empty());
+  const std::uint32_t family = sorted.places[0].family;
+  EXPECT_EQ(sorted.families[family].media.size(), 3u);
+  EXPECT_EQ(sorted.places[1].family, family);
+  EXPECT_EQ(sorted.places[7].family, family);
+  EXPECT_TRUE(sorted.families[family].wanted.empty());
 }
 
-// What lies within a family changes nothing, what widens it does.
+// A mean free path on either side of any fixed boundary.
+TEST(MaterialFamily, ReachesHalfAnOctaveFromItsShortestMember) {
+  Medium medium = make_material("Marble", ProfileKind::kDipole, 1);
+  for (const float start : {0.5f, 0.7f, 0.9f, 1.1f, 1.3f, 1.9f}) {
+    std::vector<Medium> plan;
+    for (const float scale : {1.35f, 1.0f, 1.5f, 1.41f, 2.0f}) {
+      plan.push_back(medium);
+      plan.back().scale = start * 2.0f / scale;
+    }
+    const MaterialFamilies sorted = sort_materials(plan);
+    ASSERT_EQ(sorted.families.size(), 2u) << start;
+    EXPECT_EQ(sorted.families[0].media.size(), 3u);
+    for (std::size_t i = 0; i < plan.size(); ++i)
+      EXPECT_EQ(sorted.families[sorted.places[i].family].media[sorted.places[i].index].scale, plan[i].scale);
+  }
+}
+
+// What lies within a small family changes nothing, what widens it does.
 TEST(MaterialFamily, IsKnownByItsExtremes) {
   std::vector<Medium> plan = make_plan(ProfileKind::kDipole, 1);
+  plan.resize(kFewMaterials - 1);
   const std::string digest = family_digest({plan, {}});
   const std::size_t extremes = find_extremes(plan).size();
   EXPECT_GE(extremes, 2u);
   EXPECT_LE(extremes, 4u);
   plan.insert(plan.begin() + 5, plan[1]);
   EXPECT_EQ(family_digest({plan, {}}), digest);
+  plan.insert(plan.begin() + 5, plan[1]);
+  EXPECT_NE(family_digest({plan, {}}), digest);
+  plan.pop_back();
   plan.push_back(plan[3]);
   plan.back().sigma_a *= 1.2f;
   EXPECT_NE(family_digest({plan, {}}), digest);

@@ -179,5 +179,20 @@ TEST(Reduce, AnisotropyLeavesTheReducedCoefficient) {
   EXPECT_NEAR(milk.sigma_s.x, 4.5513 / (1 - 0.75), 1e-3);
 }
 
+// Beyond, the fitted diffuse reflectance passes 1.
+TEST(Profile, HoldsForIndicesWhereItsFresnelFitDoes) {
+  for (double eta = kLeastDipoleEta; eta <= kLargestDipoleEta; eta += 0.01) {
+    EXPECT_EQ(check_eta(ProfileKind::kDipole, eta), "");
+    for (const auto make : {&make_dipole, &make_normalized_diffusion}) {
+      const Profile profile = make(0.5, 0.5, eta);
+      EXPECT_GT(profile.total, 0) << eta;
+      EXPECT_LT(profile.total, 0.5) << eta;
+    }
+  }
+  EXPECT_NE(check_eta(ProfileKind::kDipole, 4), "");
+  EXPECT_NE(check_eta(ProfileKind::kNormalized, 0.25), "");
+  EXPECT_EQ(check_eta(ProfileKind::kBetterDipole, 5), "");
+}
+
 }  // namespace
 }  // namespace nacre

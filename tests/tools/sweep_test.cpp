@@ -80,6 +80,67 @@ class Sweep : public testing::Test {
   TemporaryFolder folder_;
 };
 
+// Sixteen and more of a kind are combinations of fewer.
+TEST_F(Sweep, ManyMaterialsAreEachWithinTheTolerance) {
+  run("sweep s.xml --cache c.nacre -o d --quiet --vary sigma_a=0.02:0.08:20");
+  for (const int index : {0, 7, 12, 19}) {
+    run(fmt::format("render s.xml --cache c.nacre -o r.exr --quiet --method exact -D a={:.7g}",
+                    0.02 + 0.06 * index / 19));
+    run(fmt::format("diff d/{:04}.exr r.exr --layer diffusion --fail-above 0.01", index + 1));
+  }
+}
+
+// Under another g with the same sigma_s' light is scattered after quite other distances.
+TEST_F(Sweep, SingleScatteringIsNoNoisierThanAlone) {
+  run("sweep s.xml --cache c.nacre -o d --quiet --spp 4 --vary 'g=0;0.9'");
+  int index = 0;
+  for (const char* g : {"0", "0.9"}) {
+    const std::string picture = fmt::format("d/000{}.exr", ++index);
+    run(fmt::format("sweep s.xml --cache c.nacre -o a --quiet --spp 4 --vary g={}", g));
+    const std::string output = run("diff " + picture + " a/0001.exr --layer single --fail-above 0");
+    EXPECT_NE(output.find("identical"), std::string::npos) << output;
+  }
+}
+
+// What an included file says counts as much as what the scene's own does.
+TEST_F(Sweep, IncludedFilesCount) {
+  const auto write_lamp = [&](const char* sun) {
+    folder_.write("lamp.xml", fmt::format(R"(<scene version="0.6.0"><bsdf type="diffuse" id="paint">
+      <rgb name="reflectance" value="{}"/></bsdf></scene>)",
+                                          sun));
+  };
+  std::string text = kScene;
+  text.replace(text.find("<integrator"), 0, "<include filename=\"lamp.xml\"/>");
+  folder_.write("i.xml", text);
+  write_lamp("0.1, 0.2, 0.3");
+  const std::string sweep = "sweep i.xml --cache c.nacre -o d --vary 'g=0;0.5'";
+  EXPECT_NE(run(sweep).find("2 of 2 pictures"), std::string::npos);
+  EXPECT_NE(run(sweep).find("0 of 2 pictures"), std::string::npos);
+  write_lamp("0.3, 0.2, 0.3");
+  EXPECT_NE(run(sweep).find("2 of 2 pictures"), std::string::npos);
+}
+
+TEST_F(Sweep, PartsOfDifferentPicturesAreNotMerged) {
+  const auto sweep = [&](const std::string& to, const std::string& options) {
+    run("sweep s.xml --cache c.nacre --quiet -o " + to + " " + options);
+  };
+  sweep("a", "--vary 'g=0;0.5' --crop 0,0,20x36");
+  sweep("b", "--vary 'g=0;0.5' --crop 20,0,28x36");
+  run("merge a/0002.exr b/0002.exr -o m.exr --quiet");
+  sweep("c", "--vary 'g=0;0.5'");
+  expect_same("m.exr", "c/0002.exr");
+  EXPECT_NE(run("merge a/0001.exr b/0002.exr -o x.exr", 1).find("nacre:settings differs"), std::string::npos);
+}
+
+TEST_F(Sweep, OptionsThatContradictThePlanAreRefused) {
+  expect_refusal("--vary 'camera=front;side' --camera side", 2, "--camera side");
+  expect_refusal("--vary 'light.sun=0;1' --light sun=2", 2, "--light sun=2");
+  expect_refusal("--vary 'camera=front;side' --medium wax", 2, "--medium wax");
+  expect_refusal("--vary sigma_a=1:1.00000001:5", 2, "seven digits");
+  expect_refusal("--vary g=0 --shard ''", 2, "--shard");
+  EXPECT_NE(run("sweep s.xml --cache c.nacre -o '' --vary g=0", 2).find("--output"), std::string::npos);
+}
+
 // To the bit where materials have nothing in common, else within the tolerance of each.
 TEST_F(Sweep, EveryPictureIsThatOfASingleRender) {
   run("sweep s.xml --cache c.nacre -o d --quiet --vary sigma_a=0.02:0.08:3 --vary 'eta=1.5;1.3'");

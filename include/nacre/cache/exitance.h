@@ -120,6 +120,7 @@ class Exitance {
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
                       std::span<const Moments> moments);
   void make_kernels(const MaterialFamily& family);
+  void make_set(const MaterialFamily& family, double tolerance, double farthest);
   void make_tables();
   void make_tables(Guide& guide, std::size_t count);
   bool in_grid(const Vec3& x) const noexcept;
@@ -143,7 +144,9 @@ class Exitance {
   double spacing_;  // distance of samples
   std::size_t material_count_;
   std::vector<Kernel> kernels_;           // of the materials, then those of guides that are none of them
-  std::unique_ptr<const KernelSet> set_;  // of the materials' kernels, where they are of a family
+  std::unique_ptr<const KernelSet> set_;  // where they are of a family: theirs, or what spans them
+  std::vector<float> weights_;  // then, of each kernel of the set in each material: channel, kernel, material
+  std::size_t kernel_count_ = 1;  // that are summed up
   std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;

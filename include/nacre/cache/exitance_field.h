@@ -92,13 +92,15 @@ class ExitanceField {
   void fetch_nodes(const Part& part) const noexcept;
   bool look_up(const Place& place, Rgb* to) const noexcept;
   void make_known(std::span<const std::uint32_t> parts, std::uint64_t& evaluations) const;
-  Float4* values(std::uint32_t node) const noexcept { return values_.data() + node * materials_; }
+  Float4* values(std::uint32_t node) const noexcept { return values_.data() + node * quads_; }
+  void store(std::uint32_t node, const Rgb* materials) const noexcept;
+  void unpack(const Float4* packed, Rgb* materials) const noexcept;
   void judge(Part& part) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
-  Float4 interpolate(const Patch& patch, float u, float v, std::size_t m) const noexcept;
+  Float4 interpolate(const Patch& patch, float u, float v, std::size_t quad) const noexcept;
 
   const Exitance& exitance_;
-  std::size_t materials_;
+  std::size_t materials_, quads_;  // Float4 that the materials of a node take, packed
   std::vector<const Mesh*> meshes_;
   float most_bend_, most_change_;
   std::vector<std::uint32_t> first_triangle_;  // by mesh
@@ -107,7 +109,7 @@ class ExitanceField {
   std::vector<Vec3> positions_;             // of nodes, block by block
   std::vector<std::uint32_t> block_of_;     // by node
   std::vector<std::uint32_t> block_begin_;  // the first node of each block, and the end
-  mutable LargeArray<Float4> values_;       // of nodes, materials side by side
+  mutable LargeArray<Float4> values_;       // of nodes
   std::unique_ptr<std::atomic<std::uint8_t>[]> block_state_;
 };
 

@@ -12,16 +12,19 @@
 namespace nacre {
 
 /// Materials whose sums are made of the same nodes, refined for the strictest of them; and which of them are
-/// wanted, by index. A sum depends on the family's extremes, so that runs that share it agree, whichever they
-/// want.
+/// wanted, by index. A sum depends on the family's extremes, and on all of more than kFewMaterials, so that
+/// runs that share it agree, whichever they want.
 struct MaterialFamily {
   std::vector<Medium> media;
   std::vector<std::uint32_t> wanted{0};
 };
 
+/// As many are summed up one by one, side by side; more, as combinations of fewer (KernelSpan).
+inline constexpr std::size_t kFewMaterials = 8;
+
 /// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
-/// eta, whether it is an opaque surface or absorbs much, and a mean free path to half an octave. Fixed
-/// intervals make a member's family independent of what else there is in others.
+/// eta, whether it is an opaque surface, a mean free path to half an octave, and over how many of them light
+/// falls off, where much is absorbed.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
   std::vector<std::string> digests;  // of each, see family_digest
@@ -43,10 +46,14 @@ std::vector<ChannelChoice> find_extremes(std::span<const Medium> media);
 /// By channel, the least and the largest extinction coefficient sigma_t of the members, per scene unit.
 std::array<Rgb, 2> find_extinctions(std::span<const Medium> media);
 
+/// The members, by index, in groups in which no channel's extinction coefficient differs by more than half an
+/// octave from that of the group's first: distances that light goes before it scatters serve all of them.
+std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medium> media);
+
 /// True if a fifth of the light or more is absorbed at a scattering, in some channel: M_o falls faster then.
 bool absorbs_much(const Medium& medium);
 
-/// A 32-digit hash of the family's extremes.
+/// A 32-digit hash of what sums depend on.
 std::string family_digest(const MaterialFamily& family);
 
 }  // namespace nacre

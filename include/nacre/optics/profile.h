@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 
 #include "nacre/optics/medium.h"
 
@@ -46,6 +47,12 @@ Profile make_normalized_diffusion(double sigma_s_prime, double sigma_a, double e
 /// kept, what is further away than a few spacings changes in second order, and the sum over samples is smooth
 /// however far they are apart. Other profiles are left alone.
 Profile resolve_profile(const Profile& profile, double spacing);
+
+/// Relative indices of refraction that the fit of the diffuse Fresnel reflectance, and with it the dipole and
+/// normalized diffusion, hold for: it passes 1 at 0.26 and 3.9.
+inline constexpr double kLeastDipoleEta = 0.3, kLargestDipoleEta = 3.5;
+/// "" or what is wrong with a profile for that relative index.
+std::string check_eta(ProfileKind profile, double eta);
 
 /// The medium's own profile, r, g, b, in scene units (coefficients times scale).
 std::array<Profile, 3> make_profiles(const Medium& medium);

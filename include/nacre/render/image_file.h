@@ -39,7 +39,7 @@ BadValues find_bad_values(const Image& image, const Channel& channel);
 inline constexpr const char* kDigestKey = "nacre:digest";
 /// How an image compares to its kDigestKey: damage that leaves a file readable, and other programs, change
 /// it.
-enum class Seal { kNone, kSound, kBroken };
+enum class Seal { kAbsent, kSound, kBroken };
 Seal check_seal(const Image& image);
 
 /// Writes 32-bit float scanline OpenEXR, ZIP compressed. The file appears under its name only when complete:

@@ -30,8 +30,8 @@ class SingleScattering {
 
   /// Estimates the radiance that leaves at `point` towards `out` (unit; the side it points to counts as
   /// outside), from `samples` points along the refracted ray, each connected to every light. The points are
-  /// distributed by the mean of the three channels' free flights, those of the family's thinnest and densest
-  /// members, cut off where the ray leaves the object: the same points and connections serve all materials.
+  /// distributed by the mean of the three channels' free flights, cut off where the ray leaves the object;
+  /// materials of nearly the same extinction share points and connections (group_by_extinction).
   /// Not negative, finite; zero where nothing enters. `key` chooses the sequence of samples and
   /// `first_sample` where in it to begin: one sample for each of successive numbers is as good as many at
   /// once.

@@ -166,8 +166,9 @@ struct Integrator {
 };
 
 struct Scene {
-  std::string path;                // of the file it came from
-  std::vector<std::string> files;  // that one, and all that it includes or names
+  std::string path;                  // of the file it came from
+  std::vector<std::string> sources;  // that one and what it includes, if it is XML
+  std::vector<std::string> files;    // what is named in them
   std::vector<Shape> shapes;
   std::vector<Medium> media;
   std::vector<SubsurfaceSettings> subsurface;  // parallel to media

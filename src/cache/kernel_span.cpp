@@ -1,0 +1,116 @@
+// Materials are added to the basis one by one, each time the one that those before it come least near to.
+#include "cache/kernel_span.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "nacre/base/math.h"
+#include "nacre/base/parallel.h"
+
+namespace nacre {
+namespace {
+
+constexpr double kRowsPerOctave = 16;
+constexpr double kNearest = 1.0 / 16;  // of the narrowest width: nearer, profiles are flat
+constexpr double kNegligible = 1e-7;
+constexpr std::size_t kMost = 32;   // in a basis
+constexpr double kRounding = 3e-7;  // relative, of a sum in single precision
+
+// One channel of all materials.
+class ChannelSpan {
+ public:
+  ChannelSpan(std::span<const std::array<Profile, 3>> profiles, std::size_t channel, double farthest) {
+    double nearest = farthest;
+    for (std::size_t m = 0; m < profiles.size(); ++m)
+      if (const Profile& profile = profiles[m][channel]; profile.total > 0) {
+        members_.push_back(m);
+        nearest = std::min(nearest, kNearest * profile.width);
+      }
+    const auto rows =
+        2 + static_cast<Eigen::Index>(kRowsPerOctave * std::log2(std::max(farthest / nearest, 1.0)));
+    values_.resize(rows, std::ssize(members_));
+    scales_.resize(rows, std::ssize(members_));
+    parallel_for(members_.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Profile& profile = profiles[members_[i]][channel];
+        const auto column = static_cast<Eigen::Index>(i);
+        for (Eigen::Index row = 0; row < rows; ++row) {
+          const double r = nearest * std::exp2(static_cast<double>(row) / kRowsPerOctave);
+          const double value = eval_profile(profile, r);
+          values_(row, column) = value;
+          scales_(row, column) = 1 / std::max(value, kNegligible * profile.total / (kPi * square(r)));
+        }
+      }
+    });
+  }
+
+  // Adds to the basis until it is good enough, or larger than `most`.
+  void find_basis(double error, std::size_t most) {
+    weights_.assign(members_.size(), Eigen::VectorXd());
+    std::vector<double> errors(members_.size(), 1);
+    while (basis_.size() <= most) {
+      const auto worst = std::ranges::max_element(errors);
+      if (worst == errors.end() || *worst <= error) return;
+      basis_.push_back(worst - errors.begin());
+      parallel_for(members_.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) errors[i] = fit(i);
+      });
+    }
+  }
+
+  std::size_t size() const { return basis_.size(); }
+  std::size_t member(std::size_t j) const { return members_[static_cast<std::size_t>(basis_[j])]; }
+  void read_weights(std::size_t channel, KernelSpan& span) const {
+    for (std::size_t i = 0; i < members_.size(); ++i)
+      for (std::size_t j = 0; j < basis_.size(); ++j)
+        span.weights[members_[i]][j][channel] = static_cast<float>(weights_[i][static_cast<Eigen::Index>(j)]);
+  }
+
+ private:
+  // The weights that come nearest to a member; returns their largest error.
+  double fit(std::size_t i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    Eigen::MatrixXd terms = scales_.col(column).asDiagonal() * values_(Eigen::all, basis_);
+    const Eigen::VectorXd norms = terms.colwise().norm();
+    terms = terms * norms.cwiseInverse().asDiagonal();
+    const Eigen::VectorXd wanted = scales_.col(column).cwiseProduct(values_.col(column));
+    weights_[i] = terms.colPivHouseholderQr().solve(wanted);
+    const double error = (terms * weights_[i] - wanted).lpNorm<Eigen::Infinity>(),
+                 cancelled = (terms.cwiseAbs() * weights_[i].cwiseAbs()).maxCoeff();
+    weights_[i] = weights_[i].cwiseQuotient(norms);
+    return error + kRounding * cancelled;
+  }
+
+  std::vector<std::size_t> members_;  // that scatter in this channel
+  Eigen::MatrixXd values_, scales_;   // R_d, and over what its error is measured: distances x members
+  std::vector<Eigen::Index> basis_;
+  std::vector<Eigen::VectorXd> weights_;
+};
+
+}  // namespace
+
+std::optional<KernelSpan> find_span(std::span<const std::array<Profile, 3>> profiles, double farthest,
+                                    double error, std::size_t step) {
+  if (profiles.size() <= step) return std::nullopt;
+  const std::size_t most = std::min((profiles.size() - 1) / step * step, kMost);
+  std::vector<ChannelSpan> channels;
+  std::size_t size = 1;
+  for (std::size_t k = 0; k < 3; ++k) {
+    ChannelSpan& channel = channels.emplace_back(profiles, k, farthest);
+    channel.find_basis(error, most);
+    size = std::max(size, channel.size());
+    if (size > most) return std::nullopt;
+  }
+  size = (size + step - 1) / step * step;
+  KernelSpan span;
+  span.basis.assign(size, ChannelChoice{});
+  span.weights.assign(profiles.size(), std::vector<std::array<float, 3>>(size, {0, 0, 0}));
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t j = 0; j < channels[k].size(); ++j) span.basis[j][k] = channels[k].member(j);
+    channels[k].read_weights(k, span);
+  }
+  return span;
+}
+
+}  // namespace nacre
