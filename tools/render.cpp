@@ -213,6 +213,9 @@ void render_pictures(const Options& options, const std::vector<Picture>& picture
     const StageTimer timer(session.report(), "read_cache");
     renderer.load_exitance(options.exitance);
   }
+  // A turn sees nearly all of the surface, which is cheaper to know at once than frame by frame.
+  constexpr std::size_t kFramesOfATurn = 8;
+  if (options.film.turntable > 0 && pictures.size() >= kFramesOfATurn) renderer.fill(session.report());
   bool keeps_exitance = true, warned = false;
   std::size_t kept_nodes = 0;
   for (const Picture& picture : pictures) {

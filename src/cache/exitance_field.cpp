@@ -83,11 +83,11 @@ void ExitanceField::fetch_nodes(const Part& part) const noexcept {
 // What is beyond the last material is zero.
 void ExitanceField::store(std::uint32_t node, const Rgb* materials) const noexcept {
   values(node)[quads_ - 1] = broadcast(0);
-  std::memcpy(values(node), materials, materials_ * sizeof(Rgb));
+  std::memcpy(values(node), &materials->x, materials_ * sizeof(Rgb));
 }
 
 void ExitanceField::unpack(const Float4* packed, Rgb* materials) const noexcept {
-  std::memcpy(static_cast<void*>(materials), packed, materials_ * sizeof(Rgb));
+  std::memcpy(&materials->x, packed, materials_ * sizeof(Rgb));
 }
 
 // Evaluates the nodes of blocks that this thread has claimed, all at once, so that they share what is far.

@@ -154,8 +154,8 @@ std::string family_digest(const MaterialFamily& family) {
     for (const Medium& medium : family.media)
       for (int k = 0; k < 3; ++k) add(medium, k);
   for (const std::vector<std::uint32_t>& group : group_by_extinction(family.media)) {
-    std::vector<Medium> members;
-    for (const std::uint32_t i : group) members.push_back(family.media[i]);
+    std::vector<Medium> members(group.size());
+    std::ranges::transform(group, members.begin(), [&](std::uint32_t i) { return family.media[i]; });
     for (const Rgb& sigma_t : find_extinctions(members))
       values.emplace_back("sigma_t", fmt::format("{} {} {}", sigma_t.x, sigma_t.y, sigma_t.z));
   }

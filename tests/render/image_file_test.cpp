@@ -205,7 +205,7 @@ class FileSizeLimit {
 
 TEST_F(ImageFile, FullDiskIsAnErrorAndLeavesNothing) {
   const Image image = make_image(256, 256, {"R", "G", "B"});
-  for (const rlim_t bytes : {100, 20000}) {
+  for (const rlim_t bytes : {rlim_t{100}, rlim_t{20000}}) {
     const FileSizeLimit limit(bytes);
     const Error exr = error_of([&] { save_exr(image, path("a.exr")); });
     EXPECT_EQ(exr.code(), ErrorCode::kIo);
@@ -254,7 +254,8 @@ TEST_F(ImageFile, DamagedHeadersNeverCrash) {
       try {
         const Image back = load_exr(path("damaged.exr"));
         for (const Channel& channel : back.channels)
-          ASSERT_EQ(channel.values.size(), static_cast<std::size_t>(back.width) * back.height);
+          ASSERT_EQ(channel.values.size(),
+                    static_cast<std::size_t>(back.width) * static_cast<std::size_t>(back.height));
         if (check_seal(back) != Seal::kSound) continue;
         expect_same_bits(image, back);
         EXPECT_EQ(without_seal(back), image.metadata);

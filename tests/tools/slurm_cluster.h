@@ -67,7 +67,8 @@ class SlurmCluster {
 
   SlurmCluster() {
     ::prctl(PR_SET_CHILD_SUBREAPER, 1);
-    ::setenv("PATH", (std::string(std::getenv("PATH")) + ":/usr/sbin").c_str(), 1);
+    const char* const path = std::getenv("PATH");
+    ::setenv("PATH", (std::string(path ? path : "/bin") + ":/usr/sbin").c_str(), 1);
     ::setenv("SLURM_CONF", folder_.file("slurm.conf").c_str(), 1);
     for (const char* const name : {"state", "spool-n1", "spool-n2"})
       std::filesystem::create_directory(folder_.file(name));

@@ -239,7 +239,8 @@ TEST_F(Sweep, ShardsMakeTheSameFiles) {
 }
 
 TEST_F(Sweep, SaysThatThereIsNoSlurm) {
-  const std::string path = std::getenv("PATH");
+  const char* const given = std::getenv("PATH");
+  const std::string path = given ? given : "/bin";
   ::setenv("PATH", "/nowhere", 1);
   expect_refusal("--vary sigma_a=1:2:3 --engine slurm", 1, "no sbatch in the PATH");
   ::setenv("PATH", path.c_str(), 1);
