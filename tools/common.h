@@ -91,6 +91,8 @@ Cache run_bake(const World& world, const BakeParams& params, Session& session);
 /// Fails early, before any work, if a file cannot be created there or if it would replace one of the
 /// `inputs`.
 void check_writable(const std::string& path, const std::vector<std::string>& inputs = {});
+/// Throws UsageError if it is one of the files `inputs`.
+void check_is_none_of(const std::string& path, const std::vector<std::string>& inputs);
 /// Throws UsageError if one of `outputs` is a file that the scene was made of.
 void check_apart(const Scene& scene, const std::vector<std::string>& outputs);
 /// What --exposure is unless it is given.

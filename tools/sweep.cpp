@@ -116,6 +116,29 @@ std::vector<std::string> keys_of(const std::vector<SweepPoint>& points) {
   return keys;
 }
 
+// Nothing is replaced but what a sweep has made, and nothing of that which this one reads.
+void check_folder(const SweepOptions& options, const Scene& scene, std::size_t points) {
+  std::vector<std::string> outputs;
+  for (const char* const name : {"manifest.json", "index.html", "contact_sheet.png"})
+    outputs.push_back(options.output + "/" + name);
+  for (std::size_t i = 0; i < points; ++i)
+    for (const char* const ending : {".exr", ".png"})
+      outputs.push_back(options.output + "/" + picture_name(i) + ending);
+  std::erase_if(outputs, [](const std::string& output) {
+    std::error_code ignored;
+    return !std::filesystem::exists(std::filesystem::symlink_status(output, ignored));
+  });
+  check_apart(scene, outputs);
+  for (const std::string& output : outputs) {
+    check_is_none_of(output, {options.cache, options.plan});
+    if (!std::filesystem::is_directory(options.output + "/points"))
+      fail(ErrorCode::kValue, output, "is there, and {} is no folder of a sweep; name another for -o",
+           options.output);
+  }
+  if (!options.common.report_path.empty())
+    check_is_none_of(options.common.report_path, {options.output + "/manifest.json"});
+}
+
 void make_folders(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder + "/points", error);
@@ -159,10 +182,7 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     point.key = make_sweep_key(conditions, point, materials);
     point.whole = make_sweep_key(of_whole, point, materials);
   }
-  for (const SweepPoint& point : points) {
-    const std::string picture = options.output + "/" + picture_name(point.index);
-    check_apart(scene, {picture + ".exr", picture + ".png"});
-  }
+  check_folder(options, scene, points.size());
   make_folders(options.output);
 
   std::vector<const SweepPoint*> pending;

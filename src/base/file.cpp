@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -49,6 +50,19 @@ std::string link_to(int descriptor) { return fmt::format("/proc/self/fd/{}", des
 
 constexpr const char* kTemporary = ".tmp-";  // between a target's name and a number
 
+// What follows the target's name in one: ".tmp-", a process and a number of its own.
+bool is_temporary_ending(std::string_view ending) {
+  const std::string_view start(kTemporary);
+  if (!ending.starts_with(start)) return false;
+  ending.remove_prefix(start.size());
+  const std::size_t dash = ending.find('-');
+  const auto is_number = [](std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+  };
+  return dash != std::string_view::npos && is_number(ending.substr(0, dash)) &&
+         is_number(ending.substr(dash + 1));
+}
+
 constexpr std::time_t kSurelyLocked = 60;  // seconds after which a file that is written to has its lock
 
 // Temporary files that are in a folder when this process first writes there: one of thousands of pictures is
@@ -68,9 +82,10 @@ const std::vector<std::filesystem::path>& temporaries_in(const std::string& fold
 
 // Removes what processes that were killed have left beside a target: who still writes holds a lock.
 void remove_leftovers(const std::string& target) {
-  const std::string start = std::filesystem::path(target).filename().string() + kTemporary;
+  const std::string own = std::filesystem::path(target).filename().string();
   for (const std::filesystem::path& path : temporaries_in(folder_of(target))) {
-    if (!path.filename().string().starts_with(start)) continue;
+    const std::string name = path.filename().string();
+    if (!name.starts_with(own) || !is_temporary_ending(std::string_view(name).substr(own.size()))) continue;
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (descriptor < 0) continue;
     struct stat status;
@@ -193,6 +208,12 @@ std::string read_text_file(const std::string& path, std::size_t max_bytes) {
     const int error = errno;
     fail(error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo, path, "cannot read: {}",
          std::strerror(error));
+  }
+  struct stat status;
+  if (::fstat(descriptor, &status) == 0 && (S_ISBLK(status.st_mode) || S_ISCHR(status.st_mode)) &&
+      ::isatty(descriptor) == 0) {
+    ::close(descriptor);
+    fail(ErrorCode::kIo, path, "cannot read: a device, and no file");
   }
   std::string content;
   char buffer[1 << 16];

@@ -43,6 +43,8 @@ Light read_area_light(const XmlElement& element, std::uint32_t shape, Warnings& 
 SensorElement read_sensor(const XmlElement& element, Warnings& warnings);
 /// <integrator>
 Integrator read_integrator(const XmlElement& element, Warnings& warnings);
+/// Whether shapes of that type are read from files.
+bool is_mesh_file(std::string_view type);
 /// The mesh of a <shape> in world space: type, file and transforms, not what stands inside it.
 /// Is told how many triangles a subdivision will make, of how many that a file holds, and where it is asked
 /// for.

@@ -71,12 +71,6 @@ Mesh make_built_in_mesh(Parameters& parameters, const std::string& type) {
       "obj, ply, stl, off, serialized, sphere, rectangle, cube, disk, cylinder, shapegroup, instance");
 }
 
-bool is_mesh_file(std::string_view type) {
-  for (const std::string_view file_type : {"obj", "ply", "stl", "off", "serialized"})
-    if (type == file_type) return true;
-  return false;
-}
-
 ShapeMesh make_mesh(Parameters& parameters, const std::string& type, Warnings& warnings) {
   if (is_mesh_file(type)) return load_mesh_of_type(parameters, type, warnings);
   return {make_built_in_mesh(parameters, type)};
@@ -98,6 +92,12 @@ void place_mesh(Mesh& mesh, const Matrix4& to_world, const std::string& transfor
              std::abs(p[k]), kMaxVertex);
   if (!(surface_area(mesh) > kMinArea))
     fail(ErrorCode::kValue, place, "the shape has no area in world space");
+}
+
+bool is_mesh_file(std::string_view type) {
+  for (const std::string_view file_type : {"obj", "ply", "stl", "off", "serialized"})
+    if (type == file_type) return true;
+  return false;
 }
 
 Mesh read_mesh(const XmlElement& element, Warnings& warnings, const SubdivisionCharge& charge) {

@@ -239,6 +239,7 @@ Shape Builder::read_shape(const XmlElement& element, std::size_t number, bool em
       read_mesh(element, scene_.warnings, [&](std::size_t made, std::size_t read, const std::string& place) {
         budget_.charge_subdivision(made, read, place);
       });
+  if (!is_mesh_file(shape.type)) budget_.charge_built_in(shape.mesh.triangles.size(), shape.place);
   if (shape.surface == kNone && shape.medium == kNone)
     shape.surface = add_default_surface(shape.place, emits);
   warn_about_textures(shape);
@@ -284,13 +285,14 @@ void Builder::add_instance(const XmlElement& element) {
   const XmlElement& group_element = group_of(element);
   Group& group = groups_.at(&group_element);
   if (group.placed++ == 0) {
-    const std::size_t made = budget_.made();
+    const std::size_t made = budget_.made(), built_in = budget_.built_in();
     group.shapes = read_group(group_element);
     budget_.charge_copies(group.instances, budget_.made() - made, element.place());
     // All instances at once, before any is there.
     std::size_t triangles = 0;
     for (const Shape& shape : group.shapes) triangles += shape.mesh.triangles.size();
     budget_.charge(group.instances * triangles, group.instances * group.shapes.size(), element.place());
+    budget_.charge_built_in((group.instances - 1) * (budget_.built_in() - built_in), element.place());
   }
   Parameters parameters(element, scene_.warnings);
   const Matrix4 to_world = parameters.transform("toWorld");

@@ -16,11 +16,14 @@ class TriangleBudget {
   void charge_subdivision(std::size_t made, std::size_t read, const std::string& place);
   /// Copies of `made` triangles that subdivision has made.
   void charge_copies(std::size_t count, std::size_t made, const std::string& place);
+  /// Of spheres and the like, and their copies.
+  void charge_built_in(std::size_t triangles, const std::string& place);
   /// So far.
   std::size_t made() const { return made_; }
+  std::size_t built_in() const { return built_in_; }
 
  private:
-  std::size_t triangles_ = 0, shapes_ = 0, made_ = 0, read_ = 0;
+  std::size_t triangles_ = 0, shapes_ = 0, made_ = 0, read_ = 0, built_in_ = 0;
 };
 
 }  // namespace nacre

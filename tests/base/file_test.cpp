@@ -63,8 +63,9 @@ TEST_F(AtomicFileTest, PassesOverWhatIsLeftOfOthers) {
 // What is old and locked by nobody is of a process that was killed.
 TEST_F(AtomicFileTest, RemovesWhatTheKilledHaveLeft) {
   const std::string left = path("a") + ".tmp-7-0", young = path("a") + ".tmp-7-1",
-                    locked = path("a") + ".tmp-7-2", other = path("ab") + ".tmp-7-0";
-  for (const std::string& name : {left, young, locked, other}) {
+                    locked = path("a") + ".tmp-7-2", other = path("ab") + ".tmp-7-0",
+                    notes = path("a") + ".tmp-notes.txt";
+  for (const std::string& name : {left, young, locked, other, notes}) {
     std::ofstream(name) << "left";
     if (name != young) fs::last_write_time(name, fs::file_time_type::clock::now() - std::chrono::hours(1));
   }
@@ -72,7 +73,7 @@ TEST_F(AtomicFileTest, RemovesWhatTheKilledHaveLeft) {
   ASSERT_EQ(::flock(descriptor, LOCK_EX), 0);
   save(path("a"), "new");
   EXPECT_FALSE(fs::exists(left));
-  for (const std::string& name : {young, locked, other}) EXPECT_TRUE(fs::exists(name)) << name;
+  for (const std::string& name : {young, locked, other, notes}) EXPECT_TRUE(fs::exists(name)) << name;
   ::close(descriptor);
   save(path("a"), "newer");
   EXPECT_FALSE(fs::exists(locked));

@@ -86,6 +86,7 @@ TEST(Instances, ExplosionsAreRefused) {
   const std::string many = message(fine, 5000);
   EXPECT_NE(many.find("scene.xml:3: up to here the scene has"), std::string::npos) << many;
   EXPECT_NE(many.find("triangles, more than 200000000"), std::string::npos) << many;
+  EXPECT_NE(message(fine, 100).find("spheres, cubes and the like have 8192000 triangles"), std::string::npos);
   const std::string fission = R"(<shape type="cube"><integer name="subdivisions" value="6"/></shape>)";
   EXPECT_EQ(message(fission, 100), "100 shapes");
   EXPECT_NE(message(fission, 1000).find("scene.xml:3: up to here subdivisions make"), std::string::npos);

@@ -132,6 +132,27 @@ TEST_F(Sweep, PartsOfDifferentPicturesAreNotMerged) {
   EXPECT_NE(run("merge a/0001.exr b/0002.exr -o x.exr", 1).find("nacre:settings differs"), std::string::npos);
 }
 
+// In a folder that is none of a sweep, whatever has the name of an output is somebody's.
+TEST_F(Sweep, ReplacesNothingButSweeps) {
+  const std::string sweep = "sweep s.xml --quiet --vary 'g=0;0.5' ";
+  std::filesystem::create_directory(folder_.file("own"));
+  std::filesystem::copy_file(folder_.file("c.nacre"), folder_.file("own/manifest.json"));
+  run(sweep + "--cache own/manifest.json -o own", 2);
+  EXPECT_EQ(bytes("own/manifest.json"), bytes("c.nacre"));
+  for (const char* name : {"index.html", "0002.exr"}) {
+    const std::string folder = std::string("of_") + name;
+    std::filesystem::create_directory(folder_.file(folder));
+    folder_.write(folder + "/" + name, "mine");
+    EXPECT_NE(run(sweep + "--cache c.nacre -o " + folder, 1).find("no folder of a sweep"), std::string::npos);
+    EXPECT_EQ(bytes(folder + "/" + name), "mine");
+  }
+  run(sweep + "--cache c.nacre -o d");
+  run(sweep + "--cache c.nacre -o d --report d/manifest.json", 2);
+  folder_.write("d/manifest.json", R"([{"g": 0}])");
+  run("sweep s.xml --quiet --cache c.nacre -o d --plan d/manifest.json", 2);
+  EXPECT_EQ(bytes("d/manifest.json"), R"([{"g": 0}])");
+}
+
 TEST_F(Sweep, OptionsThatContradictThePlanAreRefused) {
   expect_refusal("--vary 'camera=front;side' --camera side", 2, "--camera side");
   expect_refusal("--vary 'light.sun=0;1' --light sun=2", 2, "--light sun=2");
