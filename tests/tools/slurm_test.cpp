@@ -92,6 +92,7 @@ TEST_F(Slurm, SubmitsWhatFailedAgain) {
 
 TEST_F(Slurm, NamesWhatFailsForGood) {
   std::filesystem::create_directories(folder_.file("d/0003.exr/in the way"));
+  std::filesystem::create_directories(folder_.file("d/points"));
   const std::string output =
       run(kSweep + std::string("-o d --engine slurm --shards 4 --retries 1 --quiet"), 1);
   EXPECT_NE(output.find("nacre: error: d: 1 of 4 pictures failed in 2 attempts: 0003; why is in "
