@@ -48,7 +48,13 @@ std::string folder_of(const std::string& path) {
 
 std::string link_to(int descriptor) { return fmt::format("/proc/self/fd/{}", descriptor); }
 
-constexpr const char* kTemporary = ".tmp-";  // between a target's name and a number
+constexpr const char* kTemporary = ".tmp-";     // between a target's name and a number
+constexpr std::size_t kLongestName = 255 - 32;  // so that both have room
+
+// A target's name, as its temporary files begin.
+std::string temporary_stem(const std::string& target) {
+  return std::filesystem::path(target).filename().string().substr(0, kLongestName);
+}
 
 // What follows the target's name in one: ".tmp-", a process and a number of its own.
 bool is_temporary_ending(std::string_view ending) {
@@ -82,7 +88,7 @@ const std::vector<std::filesystem::path>& temporaries_in(const std::string& fold
 
 // Removes what processes that were killed have left beside a target: who still writes holds a lock.
 void remove_leftovers(const std::string& target) {
-  const std::string own = std::filesystem::path(target).filename().string();
+  const std::string own = temporary_stem(target);
   for (const std::filesystem::path& path : temporaries_in(folder_of(target))) {
     const std::string name = path.filename().string();
     if (!name.starts_with(own) || !is_temporary_ending(std::string_view(name).substr(own.size()))) continue;
@@ -102,7 +108,8 @@ struct AtomicFile::Temporary {
   explicit Temporary(const std::string& target) : path(next_name(target)) {}
   static std::string next_name(const std::string& target) {
     static std::atomic<unsigned> serial{0};
-    return fmt::format("{}{}{}-{}", target, kTemporary, ::getpid(), serial++);
+    return fmt::format("{}/{}{}{}-{}", folder_of(target), temporary_stem(target), kTemporary, ::getpid(),
+                       serial++);
   }
   std::string path;
   FileInUse in_use = FileInUse::temporary(path);

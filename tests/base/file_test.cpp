@@ -79,6 +79,16 @@ TEST_F(AtomicFileTest, RemovesWhatTheKilledHaveLeft) {
   EXPECT_FALSE(fs::exists(locked));
 }
 
+TEST_F(AtomicFileTest, NamesAsLongAsFilesCanHave) {
+  const std::string longest = path(std::string(255, 'a')), left = path(std::string(223, 'a')) + ".tmp-7-0";
+  std::ofstream(left) << "left";
+  fs::last_write_time(left, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  save(longest, "first");
+  save(longest, "second");
+  EXPECT_EQ(read_text_file(longest), "second");
+  EXPECT_EQ(entries(), 1u);
+}
+
 TEST_F(AtomicFileTest, HasTheModeThatTheUserWants) {
   const mode_t before = ::umask(027);
   save(path("a"), "x");
