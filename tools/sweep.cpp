@@ -184,6 +184,7 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
   }
   check_folder(options, scene, points.size());
   make_folders(options.output);
+  const FolderClaim claim(options.output, bytes_digest(fmt::format("{}", fmt::join(keys_of(points), " "))));
 
   std::vector<const SweepPoint*> pending;
   std::size_t own = 0;

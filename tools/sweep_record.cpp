@@ -1,8 +1,13 @@
 // A small file beside each picture of a sweep, written after it.
 #include "sweep_record.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -32,6 +37,33 @@ void save_record(const std::string& folder, std::size_t index, const std::vector
   file.write(text.data(), text.size());
   file.commit();
 }
+
+// A file says whose the folder is; a lock on it, that somebody still writes there. Where files cannot be
+// locked, everybody is let in.
+FolderClaim::FolderClaim(const std::string& folder, const std::string& sweep) {
+  const std::string path = folder + "/points/sweep";
+  descriptor_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  const auto fail_io = [&] { fail(ErrorCode::kIo, path, "cannot write: {}", std::strerror(errno)); };
+  if (descriptor_ < 0) fail_io();
+  if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) {
+    if (::ftruncate(descriptor_, 0) != 0 ||
+        ::pwrite(descriptor_, sweep.data(), sweep.size(), 0) != static_cast<ssize_t>(sweep.size())) {
+      ::close(descriptor_);
+      fail_io();
+    }
+  } else if (errno != EWOULDBLOCK) {
+    return;
+  }
+  ::flock(descriptor_, LOCK_SH);
+  std::string owner(sweep.size() + 1, '\0');
+  const ssize_t got = ::pread(descriptor_, owner.data(), owner.size(), 0);
+  if (got == static_cast<ssize_t>(sweep.size()) && owner.starts_with(sweep)) return;
+  ::close(descriptor_);
+  fail(ErrorCode::kMismatch, folder,
+       "another sweep is being written there; wait until it has ended, or name another folder for -o");
+}
+
+FolderClaim::~FolderClaim() { ::close(descriptor_); }
 
 std::optional<SweepRecord> find_complete(const std::string& folder, std::size_t index,
                                          const std::string& key) {

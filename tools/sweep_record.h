@@ -22,6 +22,20 @@ std::string record_path(const std::string& folder, std::size_t index);
 
 void save_record(const std::string& folder, std::size_t index, const std::vector<Setting>& settings,
                  const SweepRecord& record);
+/// While it lives, the folder takes no pictures but those of one sweep, from as many processes as like.
+class FolderClaim {
+ public:
+  /// `sweep` is the same for shards of one, and for no other. Throws Error(kMismatch, folder) if another
+  /// sweep is writing there, Error(kIo) if the folder cannot be written to.
+  FolderClaim(const std::string& folder, const std::string& sweep);
+  ~FolderClaim();
+  FolderClaim(const FolderClaim&) = delete;
+  FolderClaim& operator=(const FolderClaim&) = delete;
+
+ private:
+  int descriptor_;
+};
+
 /// The record, if the picture that it speaks of is there, has that key and is byte for byte what was written.
 std::optional<SweepRecord> find_complete(const std::string& folder, std::size_t index,
                                          const std::string& key);
