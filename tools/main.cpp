@@ -1,5 +1,6 @@
 // The program: subcommands, errors, exit codes.
 #include <malloc.h>
+#include <sys/resource.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -15,6 +16,8 @@
 #include "nacre/base/version.h"
 
 namespace {
+
+constexpr rlim_t kLeastStack = rlim_t{1} << 20;  // bytes, of every thread
 
 std::string join_arguments(int argc, char** argv) {
   std::string line = "nacre";
@@ -61,7 +64,9 @@ int run(int argc, char** argv) {
     return report_error(error.what(), 1);
   } catch (const std::bad_alloc&) {
     return report_error(
-        "out of memory; use fewer samples (--spacing, --points) or a smaller picture (--size)", 1);
+        "out of memory; use fewer samples (--spacing, --points), a smaller picture (--size) or a machine "
+        "that has more",
+        1);
   } catch (const std::system_error& error) {
     if (std::ferror(stdout)) return report_output(error.code().value());
     return report_error(error.what(), 1);
@@ -74,6 +79,10 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   nacre::handle_signals();
+  if (rlimit stack{}; ::getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < kLeastStack)
+    return report_error(fmt::format("stacks are limited to {} kB; nacre wants {}: run `ulimit -s {}` first",
+                                    stack.rlim_cur >> 10, kLeastStack >> 10, kLeastStack >> 10),
+                        1);
   // Memory that is given back is soon wanted again: keep it, rather than have the system clear it each time.
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);

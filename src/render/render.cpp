@@ -28,7 +28,8 @@ Warnings describe_lost_samples(const Scene& scene, const Totals& totals) {
     if (static_cast<double>(totals.lost[m]) > kLostShare * static_cast<double>(totals.taken[m]))
       warnings.push_back(fmt::format(
           "{}: {} of {} single-scattering rays found no way out of {}, as through a hole; "
-          "its bounding box ended them: close its surface, or take the shading there as a guess",
+          "its bounding box ended them: close its surface, keep the camera out of it, or take the shading "
+          "there as a guess",
           scene.media[m].place, totals.lost[m].load(), totals.taken[m].load(), medium_label(scene, m)));
   return warnings;
 }

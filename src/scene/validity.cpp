@@ -15,6 +15,7 @@ constexpr double kLeastThickness = 3;  // mean free paths
 // Mean free paths by which single precision may move surfaces; they are found, and light on them, only so
 // well.
 constexpr double kMostRounding = 0.02;
+constexpr double kFarAway = 4;  // of its own size, from the origin
 
 // Surfaces that are nearer to each other than this share the density of one: about the distance of samples.
 constexpr float kNear = 0.65f;  // mean free paths
@@ -114,11 +115,13 @@ Warnings check_validity(const Scene& scene) {
           reasons.empty() ? "" : "; ", extent.thickness_mm, extent.thickness_mm / longest, kLeastThickness);
     const double rounding =
         double{extent.furthest} * 0x1p-24 * double{medium.scale} / double{smallest_mean_free_path(medium)};
-    if (rounding > kMostRounding)
-      reasons += fmt::format(
-          "{}it is so far from the origin that coordinates are rounded by {:.2g} mean free paths; move the "
-          "scene",
-          reasons.empty() ? "" : "; ", rounding);
+    if (rounding > kMostRounding) {
+      const bool far_away =
+          double{extent.furthest} * double{medium.scale} > kFarAway * max_channel(extent.size_mm);
+      reasons += fmt::format("{}it is so {} that coordinates are rounded by {:.2g} mean free paths; {}",
+                             reasons.empty() ? "" : "; ", far_away ? "far from the origin" : "dense",
+                             rounding, far_away ? "move the scene" : "check `scale`");
+    }
     if (!reasons.empty())
       warnings.push_back(fmt::format("{}: {} ({}): {}", medium.place, medium_label(scene, m), size, reasons));
   }

@@ -156,6 +156,14 @@ TEST_F(Faults, TooLittleMemory) {
   EXPECT_GT(failed, 5);
 }
 
+TEST_F(Faults, TooLittleStack) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need more";
+#endif
+  expect_error("ulimit -s 256\n" + kShort + " -o a.exr", "stacks are limited to 256 kB; nacre wants 1024");
+  EXPECT_EQ(run("ulimit -s 1024\n" + kShort + " -o a.exr").exit_code, 0);
+}
+
 // Whoever is last wins, whole.
 TEST_F(Faults, SeveralProcessesThatWriteOneFile) {
   const auto render = [](int seed, const std::string& name) {

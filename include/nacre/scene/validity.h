@@ -17,7 +17,7 @@ struct MediumExtent {
 };
 MediumExtent measure_medium(const Scene& scene, std::size_t medium);
 
-/// One line for each medium with a channel of alpha' below 0.5, or with an extent thinner than four of its
+/// One line for each medium with a channel of alpha' below 0.5, or with an extent thinner than three of its
 /// largest mean free path, naming its size in mm and in l'.
 Warnings check_validity(const Scene& scene);
 
