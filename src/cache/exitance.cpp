@@ -73,29 +73,26 @@ void Exitance::place(Target& target, std::span<const Point> range, int level, co
   target.radius = 1.000001f * target.radius + 1e-6f * std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)});
 }
 
-// A guess of the sum at the target's centre, good to a factor of two, which is all that errors need to be
-// measured against; or, certified, a lower bound for all its points.
-Float4 Exitance::weigh(const Kernel& kernel, const Target& target, Room& room) const {
+// A guess of each guide's sum at the target's centre, good to a factor of two, which is all that errors need
+// to be measured against; or, certified, a lower bound for all its points.
+Exitance::Totals Exitance::weigh(const Target& target, Room& room) const {
   const bool certified = promise_ == Promise::kCertified;
   const CoarseTest test{nodes_.data(), target.centre, certified ? kBoundRatio : kGuessRatio, certified,
                         target.radius};
-  Float4 total = broadcast(0);
+  std::array<KernelTables, kMostGuides> tables;
+  for (std::size_t g = 0; g < guides_.size(); ++g) tables[g] = kernels_[guides_[g].kernel].tables();
+  Totals totals;
+  totals.fill(broadcast(0));
   room.nodes.work.clear();
   room.nodes.work.push(0);
   while (room.nodes.work.size() > 0) {
     room.nodes.opened.clear();
-    room.evaluations += lanes::add_coarsely(kernel.tables(), test, room.nodes, total);
+    room.evaluations +=
+        lanes::add_coarsely(std::span(tables).first(guides_.size()), test, room.nodes, totals);
     room.nodes.work.clear();
     for (const std::uint32_t index : room.nodes.opened.span())
       room.nodes.work.push_run(nodes_[index].first, nodes_[index].child_count());
   }
-  return total;
-}
-
-Exitance::Totals Exitance::weigh(const Target& target, Room& room) const {
-  Totals totals;
-  for (std::size_t g = 0; g < guides_.size(); ++g)
-    totals[g] = weigh(kernels_[guides_[g].kernel], target, room);
   return totals;
 }
 

@@ -14,21 +14,14 @@ namespace nacre {
 namespace {
 
 constexpr float kAbsorbing = 0.8f;  // albedo below which much is absorbed
-// Within a family, by what factors mean free paths differ, and distances in them over which light falls to
-// 1/e.
-constexpr double kLengths = 1.4143, kFalls = 1.5;
+// By what factors mean free paths differ within a family, and extinction coefficients within a group.
+constexpr double kLengths = 8.001, kExtinctions = 1.4143;
 
 auto family_key(const Medium& medium) {
   return std::tuple(medium.profile, medium.eta(), medium.lambert, medium.convention);
 }
 
 double length_of(const Medium& medium) { return shortest_length(std::span(&medium, 1)); }
-
-// Of the channel that absorbs most, about sigma_tr l'; no less than for an albedo of kAbsorbing, from where
-// on it hardly matters.
-double fall_of(const Medium& medium) {
-  return std::sqrt(3 * (1 - std::min(kAbsorbing, min_channel(reduce(medium).alpha_prime))));
-}
 
 using Indices = std::vector<std::size_t>;
 
@@ -70,8 +63,6 @@ MaterialFamilies sort_materials(std::span<const Medium> media) {
     groups[at].push_back(i);
   }
   groups = split(groups, kLengths, [&](std::size_t i) { return length_of(media[i]); });
-  // From the strictest on.
-  groups = split(groups, kFalls, [&](std::size_t i) { return 1 / fall_of(media[i]); });
   MaterialFamilies result;
   result.places.resize(media.size());
   for (const Indices& group : groups) {
@@ -125,7 +116,7 @@ std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medi
   const auto sigma_t = [&](std::size_t i) { return (media[i].sigma_s + media[i].sigma_a) * media[i].scale; };
   const auto is_near = [](const Rgb& a, const Rgb& b) {
     for (int k = 0; k < 3; ++k)
-      if (!(std::max(a[k], b[k]) <= static_cast<float>(kLengths) * std::min(a[k], b[k]))) return false;
+      if (!(std::max(a[k], b[k]) <= static_cast<float>(kExtinctions) * std::min(a[k], b[k]))) return false;
     return true;
   };
   std::vector<std::vector<std::uint32_t>> groups;

@@ -160,20 +160,21 @@ void add_sample_series(const KernelTables& kernel, const SumSource* sources,
     add_structs<false>(kernel, sources, far, centre, expansion);
 }
 
-template <bool kInterpolated>
-HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
-                                   Float4& total) {
+// For a number of kernels that the compiler knows: their sums stay in registers.
+template <bool kInterpolated, std::size_t kCount>
+HWY_INLINE std::uint64_t add_nodes(const KernelTables* kernels, const CoarseTest& test, SortedNodes& lists,
+                                   std::span<Float4> totals) {
   const F df;
   const std::size_t lanes = hn::Lanes(df), count = lists.work.size();
   const VF cx = hn::Set(df, test.centre.x), cy = hn::Set(df, test.centre.y), cz = hn::Set(df, test.centre.z);
-  VF sums[3] = {hn::Zero(df), hn::Zero(df), hn::Zero(df)};
+  VF sums[kCount][3];
+  for (auto& channels : sums) channels[0] = channels[1] = channels[2] = hn::Zero(df);
   std::uint64_t added = 0;
   lists.work.pad();
   for (std::size_t i = 0; i < count; i += lanes) {
     const Batch batch = load_batch(lists.work, i);
     const auto [x, y, z, radius] = load_fields(test.nodes, batch.indices, kNodeX);
     const auto [red, green, blue, spare] = load_fields(test.nodes, batch.indices, kNodePower);
-    const VF powers[] = {red, green, blue};
     const VF counts = gather(test.nodes, batch.index, kNodeCounts);
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const auto has_children = hn::RebindMask(
@@ -186,23 +187,44 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables& kernel, const CoarseTest&
     const VF distance =
         test.certified ? hn::Add(hn::Add(r, radius), hn::Set(df, test.slack)) : hn::Max(r, radius);
     const VF r2 = hn::Mul(distance, distance);
-    const VI row = hn::ShiftLeft<2 + kInterpolated>(find_cell(kernel.cell_bins, r2));
-    for (int k = 0; k < 3; ++k) {
-      VF value = hn::GatherIndex(df, kernel.cells + k, row);
-      if constexpr (kInterpolated)
-        value = hn::MulAdd(find_fraction(kernel.cell_bins, r2),
-                           hn::GatherIndex(df, kernel.cells + 4 + k, row), value);
-      sums[k] = hn::MulAdd(hn::IfThenElseZero(taken, powers[k]), value, sums[k]);
+    const VF powers[] = {hn::IfThenElseZero(taken, red), hn::IfThenElseZero(taken, green),
+                         hn::IfThenElseZero(taken, blue)};
+    for (std::size_t g = 0; g < kCount; ++g) {
+      const KernelTables& kernel = kernels[g];
+      const VI row = hn::ShiftLeft<2 + kInterpolated>(find_cell(kernel.cell_bins, r2));
+      for (int k = 0; k < 3; ++k) {
+        VF value = hn::GatherIndex(df, kernel.cells + k, row);
+        if constexpr (kInterpolated)
+          value = hn::MulAdd(find_fraction(kernel.cell_bins, r2),
+                             hn::GatherIndex(df, kernel.cells + 4 + k, row), value);
+        sums[g][k] = hn::MulAdd(powers[k], value, sums[g][k]);
+      }
     }
   }
-  for (int k = 0; k < 3; ++k) total[k] += hn::GetLane(hn::SumOfLanes(df, sums[k]));
-  return added;
+  for (std::size_t g = 0; g < kCount; ++g)
+    for (std::size_t k = 0; k < 3; ++k) totals[g][k] += hn::GetLane(hn::SumOfLanes(df, sums[g][k]));
+  return added * kCount;
 }
 
-std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
-                           Float4& total) {
-  return kernel.interpolated ? add_nodes<true>(kernel, test, lists, total)
-                             : add_nodes<false>(kernel, test, lists, total);
+template <bool kInterpolated>
+HWY_INLINE std::uint64_t add_nodes(std::span<const KernelTables> kernels, const CoarseTest& test,
+                                   SortedNodes& lists, std::span<Float4> totals) {
+  switch (kernels.size()) {
+    case 1:
+      return add_nodes<kInterpolated, 1>(kernels.data(), test, lists, totals);
+    case 2:
+      return add_nodes<kInterpolated, 2>(kernels.data(), test, lists, totals);
+    case 3:
+      return add_nodes<kInterpolated, 3>(kernels.data(), test, lists, totals);
+    default:
+      return add_nodes<kInterpolated, kMostCoarse>(kernels.data(), test, lists, totals);
+  }
+}
+
+std::uint64_t add_coarsely(std::span<const KernelTables> kernels, const CoarseTest& test, SortedNodes& lists,
+                           std::span<Float4> totals) {
+  return kernels[0].interpolated ? add_nodes<true>(kernels, test, lists, totals)
+                                 : add_nodes<false>(kernels, test, lists, totals);
 }
 
 }  // namespace nacre::lanes::HWY_NAMESPACE
@@ -228,9 +250,9 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
                 const Vec3& centre, LocalExpansion& expansion) {
   HWY_DYNAMIC_DISPATCH(add_sample_series)(kernel, sources, far, centre, expansion);
 }
-std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
-                           Float4& total) {
-  return HWY_DYNAMIC_DISPATCH(add_coarsely)(kernel, test, lists, total);
+std::uint64_t add_coarsely(std::span<const KernelTables> kernels, const CoarseTest& test, SortedNodes& lists,
+                           std::span<Float4> totals) {
+  return HWY_DYNAMIC_DISPATCH(add_coarsely)(kernels, test, lists, totals);
 }
 
 }  // namespace nacre::lanes

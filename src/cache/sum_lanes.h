@@ -133,10 +133,11 @@ void add_series(const KernelTables& kernel, const SumNode* nodes, std::span<cons
                 const Vec3& centre, LocalExpansion& expansion);
 void add_series(const KernelTables& kernel, const SumSource* sources, std::span<const std::uint32_t> far,
                 const Vec3& centre, LocalExpansion& expansion);
-/// Adds R_d P of the nodes of `work` to `total`; those seen under too large an angle go to `opened`. Returns
-/// how many were added.
-std::uint64_t add_coarsely(const KernelTables& kernel, const CoarseTest& test, SortedNodes& lists,
-                           Float4& total);
+/// Adds R_d P of the nodes of `work` to the total of each of at most kMostCoarse kernels, all interpolated or
+/// none; nodes seen under too large an angle go to `opened`. Returns how many terms were added.
+inline constexpr std::size_t kMostCoarse = 4;
+std::uint64_t add_coarsely(std::span<const KernelTables> kernels, const CoarseTest& test, SortedNodes& lists,
+                           std::span<Float4> totals);
 /// Limits of `count` bins for a share of the sum, or the lower ones of these and those there are; whole
 /// vectors are read and written.
 void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits);

@@ -1,6 +1,9 @@
 // label: cli
 // Sweeps: each picture is that of a single render, whatever way it came about.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -191,15 +194,17 @@ TEST_F(Sweep, EveryPictureIsThatOfASingleRender) {
     EXPECT_GT(bytes(name).size(), 100u) << name;
 }
 
+// Mean free paths too different to share anything: to the bit what single renders are.
 TEST_F(Sweep, MultipliesCamerasLightsAndLists) {
-  run("sweep s.xml --cache c.nacre -o d --quiet --zip --vary sigma_s_prime*=1:2:2 --vary 'camera=front;side' "
+  run("sweep s.xml --cache c.nacre -o d --quiet --zip --vary sigma_s_prime*=1:10:2 --vary "
+      "'camera=front;side' "
       "--vary 'light.sun=0;1,0.5,0'");
   run("render s.xml --cache c.nacre -o a.exr --quiet --light sun=0");
-  run("render s.xml --cache c.nacre -o b.exr --quiet --camera side --light sun=1,0.5,0 -D s=2,2.4,3");
+  run("render s.xml --cache c.nacre -o b.exr --quiet --camera side --light sun=1,0.5,0 -D s=10,12,15");
   expect_same("d/0001.exr", "a.exr");
   expect_same("d/0002.exr", "b.exr");
   folder_.write("p.csv",
-                "camera,sigma_s_prime,light.sun\nfront,\"1,1.2,1.5\",0\nside,\"2,2.4,3\",\"1,0.5,0\"\n");
+                "camera,sigma_s_prime,light.sun\nfront,\"1,1.2,1.5\",0\nside,\"10,12,15\",\"1,0.5,0\"\n");
   run("sweep s.xml --cache c.nacre -o e --quiet --plan p.csv");
   expect_same("e/0002.exr", "b.exr");
   folder_.write("p.json", R"([{"material": "Marble", "scale": 2}, {"mfp": 0.5, "g": "0.5,0.5,0.5"}])");
@@ -257,6 +262,19 @@ TEST_F(Sweep, ShardsMakeTheSameFiles) {
   run(sweep + "e --shard 1/2 --threads 1");
   for (const char* name : {"0001.exr", "0002.exr", "0005.exr", "0004.png", "contact_sheet.png", "index.html"})
     EXPECT_EQ(bytes(std::string("d/") + name), bytes(std::string("e/") + name)) << name;
+}
+
+TEST_F(Sweep, TwoSweepsDoNotShareAFolder) {
+  const std::string sweep = "sweep s.xml --cache c.nacre --quiet -o x --vary sigma_a=0.01:0.05:2";
+  run(sweep);
+  // As another process that writes there.
+  const int other = ::open(folder_.file("x/points/sweep").c_str(), O_RDWR);
+  ASSERT_EQ(::flock(other, LOCK_SH), 0);
+  run(sweep + " --exposure 2");  // the same sweep
+  expect_refusal("--quiet --vary sigma_a=0.01:0.05:3", 1, "x: another sweep is being written there; wait");
+  ::close(other);
+  run("sweep s.xml --cache c.nacre --quiet -o x --vary sigma_a=0.01:0.05:3");
+  EXPECT_EQ(manifest("x")["pictures"].size(), 3u);
 }
 
 TEST_F(Sweep, SaysThatThereIsNoSlurm) {

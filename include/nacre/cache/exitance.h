@@ -129,7 +129,6 @@ class Exitance {
   void eval_points(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations,
                    bool whole) const;
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
-  Float4 weigh(const Kernel& kernel, const Target& target, Room& room) const;
   Totals weigh(const Target& target, Room& room) const;
   void make_limits(const Target& target, Room& room) const;
   void eval_point(const Target& target, const Point& point, Room& room) const;

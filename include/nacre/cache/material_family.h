@@ -23,8 +23,8 @@ struct MaterialFamily {
 inline constexpr std::size_t kFewMaterials = 8;
 
 /// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
-/// eta, whether it is an opaque surface, a mean free path to half an octave, and over how many of them light
-/// falls off, where much is absorbed.
+/// eta, whether it is an opaque surface, and a mean free path to three octaves: up to there it costs less to
+/// refine once, for the strictest, than to do so for several families.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
   std::vector<std::string> digests;  // of each, see family_digest
