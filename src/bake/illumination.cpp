@@ -54,7 +54,7 @@ std::vector<SampleLight> Illumination::compute_round(const World& world, std::si
         (plane * (kInterreflections + 1) + static_cast<std::size_t>(round)) * placed_.size() + m;
     lights.push_back(compute_irradiance(
         world, {placed.samples.positions, placed.samples.normals, placed.extents, placed.albedos},
-        world.scene->media[m].eta(),
+        world.media[m].eta(),
         {plan_.groups[m].irradiance_samples, plan_.groups[m].bounces, params_.irradiance_error,
          keeps_every_eta(*world.scene, params_), hash_words(params_.seed, m, 1), &journal_, pass},
         progress_, answer));

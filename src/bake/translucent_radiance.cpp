@@ -18,7 +18,7 @@ TranslucentRadiance::TranslucentRadiance(const World& world, std::span<const Cac
     : world_(world), cache_(groups) {
   for (std::size_t m = 0; m < groups.size(); ++m) {
     const CacheGroup& group = groups[m];
-    const Medium& medium = world.scene->media[m];
+    const Medium& medium = world.media[m];
     groups_.push_back({std::vector<Rgb>(group.size()), exit_factor(medium)});
     const Exitance exitance(group, medium, kTolerance);
     progress.begin("exitance of " + group.name, "samples", group.size());

@@ -136,7 +136,7 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   room.far.resize(set_->width());
   target.set_far.eval(x - target.centre, room.far);
   room.totals.assign(room.far.begin(), room.far.end());
-  lanes::add_sources(*set_, room.list, x, room.totals);
+  lanes::add_sources(*set_, room.list, source_powers(), x, room.totals);
   for (int k = 0; k < 3; ++k) {
     const double* const totals = room.totals.data() + static_cast<std::size_t>(k) * set_->padded();
     if (weights_.empty()) {
@@ -151,6 +151,21 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
         room.combined[m] += weights[m] * static_cast<float>(totals[j]);
     for (std::size_t m = 0; m < material_count_; ++m) values[m][k] = std::max(room.combined[m], 0.0f);
   }
+}
+
+// Far away from all samples, where no surface is.
+void Exitance::eval_outside(const Point& point, Room& room) const {
+  if (powers_.size() == 0)
+    return sum_exactly(room.points.subspan(point.index, 1),
+                       room.exitance.subspan(point.index * material_count_, material_count_),
+                       room.evaluations);
+  Target& target = room.targets[0];
+  target.centre = room.points[point.index];
+  target.set_far.clear(set_->width());
+  room.list.clear();
+  for (std::size_t i = 0; i < source_count_; ++i) room.list.add(sources_[i]);
+  room.list.pad();
+  eval_point(target, point, room);
 }
 
 // Sums up for the points of one block or cell, which follow each other.
@@ -220,20 +235,21 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     target.pending.append(nodes.pending.span());
   }
   if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
-  const auto add_far = [&](const auto& kernel, auto& expansion) {
-    lanes::add_series(kernel, nodes_.data(), nodes.far.span(), target.centre, expansion);
-    lanes::add_series(kernel, sources_.data(), nodes.far_samples.span(), target.centre, expansion);
-  };
-  if (set_)
-    add_far(*set_, target.set_far);
-  else
-    add_far(kernels_[0].tables(), target.far);
+  const auto far = nodes.far.span(), far_samples = nodes.far_samples.span();
+  if (set_) {
+    lanes::add_series(*set_, nodes_.data(), node_powers(), far, target.centre, target.set_far);
+    lanes::add_series(*set_, sources_.data(), source_powers(), far_samples, target.centre, target.set_far);
+  } else {
+    lanes::add_series(kernels_[0].tables(), nodes_.data(), far, target.centre, target.far);
+    lanes::add_series(kernels_[0].tables(), sources_.data(), far_samples, target.centre, target.far);
+  }
   room.evaluations += kernel_count_ * (nodes.far.size() + nodes.far_samples.size());
 
   if (is_leaf) {
     for (const std::uint32_t index : nodes.points.span()) {
       const SumNode& node = nodes_[index];
-      room.list.add({node.x, node.y, node.z, 0, node.power});
+      const auto row = static_cast<std::uint32_t>(source_count_) + index;
+      room.list.add({node.x, node.y, node.z, 0, node_powers() ? with_row(node.power, row) : node.power});
     }
     room.list.pad();
     for (const Point& point : range) eval_point(target, point, room);
@@ -264,17 +280,16 @@ void Exitance::eval_points(std::span<const Vec3> points, std::span<Rgb> exitance
   const std::vector<Vec3> places = scaled(points);
   std::vector<Point> order;
   order.reserve(points.size());
+  Room room{places, exitance, whole, {}, {}, {}, {}, {}, {}, {}, 0};
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     if (in_grid(points[i]))
       order.push_back({cell_code(points[i]), i});
-    else  // far away from all samples, where no surface is
-      sum_exactly(std::span(places).subspan(i, 1), exitance.subspan(i * material_count_, material_count_),
-                  evaluations);
+    else
+      eval_outside({0, i}, room);
   }
   std::ranges::sort(order, [](const Point& a, const Point& b) {
     return a.code != b.code ? a.code < b.code : a.index < b.index;
   });
-  Room room{places, exitance, whole, {}, {}, {}, {}, {}, {}, {}, 0};
   for (std::size_t begin = 0; begin < order.size();) {
     std::size_t end = begin + 1;
     while (end < order.size() && order[end].code >> 3 * kBlockLevels == order[begin].code >> 3 * kBlockLevels)

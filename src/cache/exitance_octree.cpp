@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <map>
 
+#include "cache/kernel_set.h"
 #include "nacre/base/parallel.h"
 #include "nacre/cache/exitance.h"
 
@@ -15,6 +17,9 @@ constexpr std::size_t kRun = 4096;
 // What a grain may err by, as a share of what a node is allowed that is seen from a distance: it is looked at
 // from everywhere.
 constexpr double kGrainShare = 1.0 / 16;
+
+// Marks a source that is a node of the octree.
+constexpr std::uint32_t kGrainBit = 0x80000000u;
 
 // A node without its tensor and what is below it.
 SumNode make_node(const OctreeNode& from) noexcept {
@@ -103,8 +108,9 @@ Exitance::Grains Exitance::find_grains() const {
   return grains;
 }
 
-// Level by level. Of ten million samples most are below grains, and are not even read.
-void Exitance::copy_octree() {
+// Level by level. Of ten million samples most are below grains, and are not even read. Returns what each
+// source is: a sample, or with kGrainBit the octree's node of that index.
+std::vector<std::uint32_t> Exitance::copy_octree() {
   const Grains grains = find_grains();
   nodes_ = LargeArray<SumNode>(group_.nodes.size());  // at most: memory is taken where it is written
   sources_ = LargeArray<SumSource>(group_.size());
@@ -113,6 +119,7 @@ void Exitance::copy_octree() {
     std::uint32_t child, source;  // the first of each
   };
   std::vector<Place> places;
+  std::vector<std::uint32_t> origins;
   std::vector<std::uint32_t> level{0}, next;  // indices in the cache
   for (std::uint32_t begin = 0, source = 0; !level.empty(); level.swap(next)) {
     places.resize(level.size());
@@ -140,6 +147,7 @@ void Exitance::copy_octree() {
       }
     }
     next.resize(child - end);
+    origins.resize(source);
     parallel_for(level.size(), kRun, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) {
         const OctreeNode from = make_octree_node(level[i]);
@@ -147,6 +155,7 @@ void Exitance::copy_octree() {
         SumNode node = make_node(from);
         node.first = place.source;
         SumSource* const to = sources_.data() + place.source;
+        std::uint32_t* const origin = origins.data() + place.source;
         switch (place.below) {
           case Below::kChildren:
             node.first = place.child;
@@ -156,22 +165,87 @@ void Exitance::copy_octree() {
             break;
           case Below::kGrains:
             node.packed_counts = from.child_count();
-            for (std::uint32_t c = 0; c < from.child_count(); ++c)
+            for (std::uint32_t c = 0; c < from.child_count(); ++c) {
               to[c] = make_grain(make_octree_node(from.first_child + c));
+              origin[c] = kGrainBit | (from.first_child + c);
+            }
             break;
           case Below::kSamples:
             node.packed_counts = from.sample_count();
-            for (std::uint32_t s = 0; s < from.sample_count(); ++s)
+            for (std::uint32_t s = 0; s < from.sample_count(); ++s) {
               to[s] = make_source(from.first_sample + s);
+              origin[s] = from.first_sample + s;
+            }
             break;
           case Below::kItself:
             node.packed_counts = 1;
             to[0] = make_grain(from);
+            origin[0] = kGrainBit | level[i];
         }
         nodes_[begin + i] = node;
       }
     });
     begin = end;
+    node_count_ = end;
+  }
+  source_count_ = origins.size();
+  return origins;
+}
+
+// The power of each source under the light for an index of refraction.
+std::vector<Float4> Exitance::source_powers(std::span<const std::uint32_t> origins, double eta,
+                                            const IrradianceForEta& irradiance) const {
+  const std::array<std::vector<float>, 3> planes = irradiance(eta);
+  std::vector<Float4> powers(origins.size());
+  parallel_for(origins.size(), kRun, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      std::uint32_t first = origins[i], count = 1;
+      if (first & kGrainBit) {
+        const OctreeNode& grain = group_.nodes[first & ~kGrainBit];
+        first = grain.first_sample;
+        count = grain.sample_count();
+      }
+      Vec3d sum(0, 0, 0);
+      for (std::size_t s = first; s < first + count; ++s)
+        for (int k = 0; k < 3; ++k)
+          sum[k] += double{planes[static_cast<std::size_t>(k)][s]} * double{group_.area(s)};
+      sum *= square(double{unit_});
+      powers[i] = Float4{static_cast<float>(sum.x), static_cast<float>(sum.y), static_cast<float>(sum.z), 0};
+    }
+  });
+  return powers;
+}
+
+// Moments are those of the least index; they hold for all others if they do for the largest. Rows are read
+// for each kernel, so each has what its own index gives.
+void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_eta,
+                           const IrradianceForEta& irradiance) {
+  add_all_moments(source_powers(origins, most_eta, irradiance));
+  set_width_ = set_->width();
+  powers_ = LargeArray<float>((source_count_ + node_count_) * set_width_);
+  parallel_for(source_count_ + node_count_, kRun, [&](std::size_t begin, std::size_t end) {
+    std::fill(powers_.data() + begin * set_width_, powers_.data() + end * set_width_, 0.0f);
+  });
+  std::map<double, std::vector<std::size_t>> lanes_of;  // by index
+  for (std::size_t j = 0; j < kernel_etas_.size(); ++j)
+    for (std::size_t k = 0; k < 3; ++k) lanes_of[kernel_etas_[j][k]].push_back(k * set_->padded() + j);
+  for (const auto& [eta, lanes] : lanes_of) {
+    const std::vector<Float4> powers = source_powers(origins, eta, irradiance);
+    parallel_for(powers.size(), kRun, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        for (const std::size_t lane : lanes) powers_[i * set_width_ + lane] = powers[i][lane / set_->padded()];
+    });
+  }
+  for (std::uint32_t i = 0; i < source_count_; ++i) sources_[i].power = with_row(sources_[i].power, i);
+  // Children come after their parents.
+  for (std::size_t n = node_count_; n-- > 0;) {
+    const SumNode& node = nodes_[n];
+    const bool is_leaf = node.child_count() == 0;
+    float* const to = powers_.data() + (source_count_ + n) * set_width_;
+    const float* from = powers_.data() + (is_leaf ? node.first : source_count_ + node.first) * set_width_;
+    const std::uint32_t count = is_leaf ? node.sample_count() : node.child_count();
+    for (std::uint32_t c = 0; c < count; ++c, from += set_width_)
+      for (std::size_t lane = 0; lane < set_width_; ++lane) to[lane] += from[lane];
   }
 }
 

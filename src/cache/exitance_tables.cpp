@@ -9,6 +9,7 @@
 #include "nacre/base/error.h"
 #include "nacre/base/parallel.h"
 #include "nacre/cache/exitance.h"
+#include "nacre/optics/eta_change.h"
 
 namespace nacre {
 namespace {
@@ -48,7 +49,8 @@ Medium in_units(Medium medium, float unit) {
 
 }  // namespace
 
-Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance, Promise promise)
+Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance, Promise promise,
+                   const IrradianceForEta& irradiance)
     : group_(group),
       unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(shortest_length(family.media)), -100, 100))),
       spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
@@ -75,6 +77,9 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
+  const EtaRange etas = eta_range(family);
+  if (etas.is_mixed() && (!(tolerance > 0) || promise == Promise::kCertified || !irradiance))
+    fail(ErrorCode::kValue, group.name, "materials of several indices of refraction are summed up one by one");
   if (!(tolerance > 0)) return;
   if (promise == Promise::kCertified) {
     double tables = 0, jets = 0;
@@ -94,8 +99,9 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance)
     for (Kernel& kernel : kernels_) kernel.make_middles();
   if (family.media.size() > 1) make_set(family, tolerance, size.length());
-  copy_octree();
-  add_all_moments();
+  const std::vector<std::uint32_t> origins = copy_octree();
+  add_all_moments({});
+  if (etas.is_mixed()) make_powers(origins, double{etas.most}, irradiance);
   make_tables();
 }
 
@@ -154,23 +160,33 @@ void Exitance::make_kernels(const MaterialFamily& family) {
 
 // Many materials are combinations of a few kernels. Those are of the whole family, whatever is wanted of it.
 void Exitance::make_set(const MaterialFamily& family, double tolerance, double farthest) {
+  const bool mixed = eta_range(family).is_mixed();
+  const auto add_eta = [&](const ChannelChoice& choice) {
+    if (mixed)
+      kernel_etas_.push_back({double{family.media[choice[0]].eta()}, double{family.media[choice[1]].eta()},
+                              double{family.media[choice[2]].eta()}});
+  };
   kernel_count_ = material_count_;
   std::optional<KernelSpan> span;
-  std::vector<std::array<Profile, 3>> profiles;
+  std::vector<Response> responses;
   if (promise_ == Promise::kCalibrated) {
     for (const Medium& medium : family.media)
-      profiles.push_back(resolved_profiles(in_units(medium, unit_), spacing_));
-    span = find_span(profiles, farthest, kSpanShare * tolerance, KernelSet::kLanes);
+      responses.push_back({resolved_profiles(in_units(medium, unit_), spacing_),
+                           mixed ? entering_shares(double{medium.eta()}) : std::vector<double>{}});
+    span = find_span(responses, farthest, kSpanShare * tolerance, KernelSet::kLanes);
   }
   if (!span) {
     set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
+    for (const std::uint32_t material : family.wanted) add_eta({material, material, material});
     return;
   }
   kernel_count_ = span->basis.size();
   std::vector<Kernel> kernels;
   for (const ChannelChoice& choice : span->basis) {
-    kernels.emplace_back(std::array{profiles[choice[0]][0], profiles[choice[1]][1], profiles[choice[2]][2]});
+    kernels.emplace_back(std::array{responses[choice[0]].profiles[0], responses[choice[1]].profiles[1],
+                                    responses[choice[2]].profiles[2]});
     if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
+    add_eta(choice);
   }
   set_ = std::make_unique<const KernelSet>(kernels);
   for (std::size_t k = 0; k < 3; ++k)

@@ -1,6 +1,8 @@
 // The kernels of several materials side by side.
 #pragma once
 
+#include <bit>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -52,14 +54,23 @@ class SetExpansion {
   std::vector<float> coefficients_;
 };
 
+/// The row that a power is that of, kept where a fourth channel would be.
+inline std::uint32_t power_row(const Float4& power) noexcept { return std::bit_cast<std::uint32_t>(power[3]); }
+inline Float4 with_row(Float4 power, std::uint32_t row) noexcept {
+  power[3] = std::bit_cast<float>(row);
+  return power;
+}
+
 namespace lanes {
 
-/// As for a single kernel; `totals` has `width` sums.
-void add_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals);
-void add_series(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
-                const Vec3& centre, SetExpansion& expansion);
-void add_series(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
-                const Vec3& centre, SetExpansion& expansion);
+/// As for a single kernel; `totals` has `width` sums. Where kernels have a light each, `powers` are rows of
+/// `width` floats, one for each node or source, and in lists that of power_row; else nullptr.
+void add_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
+                 std::span<double> totals);
+void add_series(const KernelSet& set, const SumNode* nodes, const float* powers,
+                std::span<const std::uint32_t> far, const Vec3& centre, SetExpansion& expansion);
+void add_series(const KernelSet& set, const SumSource* sources, const float* powers,
+                std::span<const std::uint32_t> far, const Vec3& centre, SetExpansion& expansion);
 
 }  // namespace lanes
 }  // namespace nacre

@@ -20,26 +20,33 @@ constexpr double kRounding = 3e-7;  // relative, of a sum in single precision
 // One channel of all materials.
 class ChannelSpan {
  public:
-  ChannelSpan(std::span<const std::array<Profile, 3>> profiles, std::size_t channel, double farthest) {
+  ChannelSpan(std::span<const Response> responses, std::size_t channel, double farthest) {
     double nearest = farthest;
-    for (std::size_t m = 0; m < profiles.size(); ++m)
-      if (const Profile& profile = profiles[m][channel]; profile.total > 0) {
+    for (std::size_t m = 0; m < responses.size(); ++m)
+      if (const Profile& profile = responses[m].profiles[channel]; profile.total > 0) {
         members_.push_back(m);
         nearest = std::min(nearest, kNearest * profile.width);
       }
     const auto rows =
         2 + static_cast<Eigen::Index>(kRowsPerOctave * std::log2(std::max(farthest / nearest, 1.0)));
-    values_.resize(rows, std::ssize(members_));
-    scales_.resize(rows, std::ssize(members_));
+    const Eigen::Index angles = std::max<Eigen::Index>(std::ssize(responses[0].entering), 1);
+    values_.resize(rows * angles, std::ssize(members_));
+    scales_.resize(rows * angles, std::ssize(members_));
     parallel_for(members_.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const Profile& profile = profiles[members_[i]][channel];
+        const Response& response = responses[members_[i]];
+        const Profile& profile = response.profiles[channel];
         const auto column = static_cast<Eigen::Index>(i);
         for (Eigen::Index row = 0; row < rows; ++row) {
           const double r = nearest * std::exp2(static_cast<double>(row) / kRowsPerOctave);
-          const double value = eval_profile(profile, r);
-          values_(row, column) = value;
-          scales_(row, column) = 1 / std::max(value, kNegligible * profile.total / (kPi * square(r)));
+          const double value = eval_profile(profile, r),
+                       least = std::max(value, kNegligible * profile.total / (kPi * square(r)));
+          for (Eigen::Index angle = 0; angle < angles; ++angle) {
+            const double share =
+                response.entering.empty() ? 1 : response.entering[static_cast<std::size_t>(angle)];
+            values_(row * angles + angle, column) = share * value;
+            scales_(row * angles + angle, column) = 1 / (share * least);
+          }
         }
       }
     });
@@ -83,21 +90,22 @@ class ChannelSpan {
   }
 
   std::vector<std::size_t> members_;  // that scatter in this channel
-  Eigen::MatrixXd values_, scales_;   // R_d, and over what its error is measured: distances x members
+  // R_d times what enters, and over what its error is measured: distances and angles x members.
+  Eigen::MatrixXd values_, scales_;
   std::vector<Eigen::Index> basis_;
   std::vector<Eigen::VectorXd> weights_;
 };
 
 }  // namespace
 
-std::optional<KernelSpan> find_span(std::span<const std::array<Profile, 3>> profiles, double farthest,
-                                    double error, std::size_t step) {
-  if (profiles.size() <= step) return std::nullopt;
-  const std::size_t most = std::min((profiles.size() - 1) / step * step, kMost);
+std::optional<KernelSpan> find_span(std::span<const Response> responses, double farthest, double error,
+                                    std::size_t step) {
+  if (responses.size() <= step) return std::nullopt;
+  const std::size_t most = std::min((responses.size() - 1) / step * step, kMost);
   std::vector<ChannelSpan> channels;
   std::size_t size = 1;
   for (std::size_t k = 0; k < 3; ++k) {
-    ChannelSpan& channel = channels.emplace_back(profiles, k, farthest);
+    ChannelSpan& channel = channels.emplace_back(responses, k, farthest);
     channel.find_basis(error, most);
     size = std::max(size, channel.size());
     if (size > most) return std::nullopt;
@@ -105,7 +113,7 @@ std::optional<KernelSpan> find_span(std::span<const std::array<Profile, 3>> prof
   size = (size + step - 1) / step * step;
   KernelSpan span;
   span.basis.assign(size, ChannelChoice{});
-  span.weights.assign(profiles.size(), std::vector<std::array<float, 3>>(size, {0, 0, 0}));
+  span.weights.assign(responses.size(), std::vector<std::array<float, 3>>(size, {0, 0, 0}));
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t j = 0; j < channels[k].size(); ++j) span.basis[j][k] = channels[k].member(j);
     channels[k].read_weights(k, span);

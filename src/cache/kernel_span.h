@@ -12,18 +12,26 @@
 
 namespace nacre {
 
-/// R_d of a material is the sum over `basis` of its weight times R_d of that one. As sums over samples are
-/// linear in R_d, so are they, and what tables and series make of them.
+/// What a material makes of light: R_d by channel, and the share of light from each of some angles that
+/// enters it. Those without angles let in all alike.
+struct Response {
+  std::array<Profile, 3> profiles;
+  std::vector<double> entering;
+};
+
+/// R_d of a material times what enters is the sum over `basis` of its weight times that of those. As sums
+/// over samples are linear in both, so are they, and what tables and series make of them.
 struct KernelSpan {
   std::vector<ChannelChoice> basis;  // whose profiles these are, by channel
   /// `weights[m][j]` is what the j-th of them counts for material m, by channel.
   std::vector<std::vector<std::array<float, 3>>> weights;
 };
 
-/// The fewest materials, rounded up to a multiple of `step`, that span the profiles of all to a relative
-/// error of at most `error` at every distance up to `farthest`; beyond where R_d is a ten-millionth of its
-/// mean over the disc that reaches there, relative to that. Nothing if they would be no fewer than all.
-std::optional<KernelSpan> find_span(std::span<const std::array<Profile, 3>> profiles, double farthest,
-                                    double error, std::size_t step);
+/// The fewest materials, rounded up to a multiple of `step`, that span the responses of all to a relative
+/// error of at most `error` at every angle (all have the same number) and every distance up to `farthest`;
+/// beyond where R_d is a ten-millionth of its mean over the disc that reaches there, relative to that. Nothing
+/// if they would be no fewer than all.
+std::optional<KernelSpan> find_span(std::span<const Response> responses, double farthest, double error,
+                                    std::size_t step);
 
 }  // namespace nacre

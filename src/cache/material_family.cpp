@@ -17,8 +17,9 @@ constexpr float kAbsorbing = 0.8f;  // albedo below which much is absorbed
 // By what factors mean free paths differ within a family, and extinction coefficients within a group.
 constexpr double kLengths = 8.001, kExtinctions = 1.4143;
 
-auto family_key(const Medium& medium) {
-  return std::tuple(medium.profile, medium.eta(), medium.lambert, medium.convention);
+auto family_key(const Medium& medium, bool mixes_eta) {
+  const float eta = mixes_eta && !medium.lambert ? 0 : medium.eta();
+  return std::tuple(medium.profile, eta, medium.lambert, medium.convention);
 }
 
 double length_of(const Medium& medium) { return shortest_length(std::span(&medium, 1)); }
@@ -54,11 +55,11 @@ double shortest_length(std::span<const Medium> media) {
 
 bool absorbs_much(const Medium& medium) { return min_channel(reduce(medium).alpha_prime) < kAbsorbing; }
 
-MaterialFamilies sort_materials(std::span<const Medium> media) {
-  std::map<decltype(family_key(media[0])), std::size_t> keys;
+MaterialFamilies sort_materials(std::span<const Medium> media, bool mixes_eta) {
+  std::map<decltype(family_key(media[0], mixes_eta)), std::size_t> keys;
   std::vector<Indices> groups;
   for (std::size_t i = 0; i < media.size(); ++i) {
-    const std::size_t at = keys.try_emplace(family_key(media[i]), groups.size()).first->second;
+    const std::size_t at = keys.try_emplace(family_key(media[i], mixes_eta), groups.size()).first->second;
     if (at == groups.size()) groups.emplace_back();
     groups[at].push_back(i);
   }
@@ -112,6 +113,15 @@ std::array<Rgb, 2> find_extinctions(std::span<const Medium> media) {
   return range;
 }
 
+EtaRange eta_range(const MaterialFamily& family) {
+  EtaRange range{family.media[0].eta(), family.media[0].eta()};
+  for (const Medium& medium : family.media) {
+    range.least = std::min(range.least, medium.eta());
+    range.most = std::max(range.most, medium.eta());
+  }
+  return range;
+}
+
 std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medium> media) {
   const auto sigma_t = [&](std::size_t i) { return (media[i].sigma_s + media[i].sigma_a) * media[i].scale; };
   const auto is_near = [](const Rgb& a, const Rgb& b) {
@@ -121,8 +131,9 @@ std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medi
   };
   std::vector<std::vector<std::uint32_t>> groups;
   for (std::uint32_t i = 0; i < media.size(); ++i) {
-    const auto group =
-        std::ranges::find_if(groups, [&](const auto& g) { return is_near(sigma_t(g[0]), sigma_t(i)); });
+    const auto group = std::ranges::find_if(groups, [&](const auto& g) {
+      return media[g[0]].eta() == media[i].eta() && is_near(sigma_t(g[0]), sigma_t(i));
+    });
     if (group == groups.end())
       groups.push_back({i});
     else
@@ -141,6 +152,8 @@ std::string family_digest(const MaterialFamily& family) {
   };
   for (const ChannelChoice& choice : find_extremes(family.media))
     for (int k = 0; k < 3; ++k) add(family.media[choice[static_cast<std::size_t>(k)]], k);
+  const EtaRange etas = eta_range(family);
+  values.emplace_back("eta", fmt::format("{} {}", etas.least, etas.most));
   if (family.media.size() > kFewMaterials)
     for (const Medium& medium : family.media)
       for (int k = 0; k < 3; ++k) add(medium, k);

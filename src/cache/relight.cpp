@@ -25,21 +25,30 @@ void keep_alive(Cache& cache, std::shared_ptr<const void> owned) {
       std::move(cache.storage), std::move(owned));
 }
 
+using IrradiancePlanes = std::array<std::vector<float>, 3>;
+
 struct RelitGroup {
-  std::array<std::vector<float>, 3> irradiance;
+  IrradiancePlanes irradiance;
   std::vector<float> errors;
   std::vector<OctreeNode> nodes;
 };
 
-// Errors of lights are independent of each other; they are multiplied by what the irradiance was on average.
-std::shared_ptr<const RelitGroup> relight_group(CacheGroup& group, double eta,
-                                                std::span<const LightScale> scales) {
+bool is_changed(const CacheGroup& group, double eta, std::span<const LightScale> scales) {
+  return group.eta != eta || std::ranges::any_of(group.lights, [&](const LightPlane& light) {
+           return scale_of(scales, light.name) != kAsBaked;
+         });
+}
+
+// Lights summed up. Their errors are independent of each other, and multiplied by what the irradiance was on
+// average; none if `errors` is nullptr.
+IrradiancePlanes sum_lights(const CacheGroup& group, double eta, std::span<const LightScale> scales,
+                            std::vector<float>* errors) {
   const std::size_t n = group.size();
-  const auto relit = std::make_shared<RelitGroup>();
-  for (auto& plane : relit->irradiance) plane.assign(n, 0);
+  IrradiancePlanes sum;
+  for (auto& plane : sum) plane.assign(n, 0);
   const bool has_errors =
-      std::ranges::all_of(group.lights, [&](const LightPlane& l) { return l.errors.size() == n; });
-  if (has_errors) relit->errors.assign(n, 0);
+      errors && std::ranges::all_of(group.lights, [&](const LightPlane& l) { return l.errors.size() == n; });
+  if (has_errors) errors->assign(n, 0);
   const EtaChange change(group.eta, eta);
   for (const LightPlane& light : group.lights) {
     const Rgb scale = scale_of(scales, light.name);
@@ -48,13 +57,20 @@ std::shared_ptr<const RelitGroup> relight_group(CacheGroup& group, double eta,
       for (std::size_t i = begin; i < end; ++i) {
         const Rgb before(light.irradiance[0][i], light.irradiance[1][i], light.irradiance[2][i]);
         const Rgb after = (changes_eta ? change(before, light.ratios[i]) : before) * scale;
-        for (std::size_t k = 0; k < 3; ++k) relit->irradiance[k][i] += after[static_cast<int>(k)];
+        for (std::size_t k = 0; k < 3; ++k) sum[k][i] += after[static_cast<int>(k)];
         if (!has_errors || is_black(before)) continue;
         const float error = light.errors[i] * mean_channel(after) / mean_channel(before);
-        relit->errors[i] = std::hypot(relit->errors[i], error);
+        (*errors)[i] = std::hypot((*errors)[i], error);
       }
     });
   }
+  return sum;
+}
+
+std::shared_ptr<const RelitGroup> relight_group(CacheGroup& group, double eta,
+                                                std::span<const LightScale> scales) {
+  const auto relit = std::make_shared<RelitGroup>();
+  relit->irradiance = sum_lights(group, eta, scales, &relit->errors);
   relit->nodes.assign(group.nodes.begin(), group.nodes.end());
   for (std::size_t k = 0; k < 3; ++k) group.planes[7 + k] = relit->irradiance[k];
   sum_nodes(group, relit->nodes);
@@ -77,11 +93,23 @@ bool serves_eta(const CacheGroup& group, double eta) noexcept {
 void relight(Cache& cache, std::span<const double> etas, std::span<const LightScale> scales) {
   for (std::size_t g = 0; g < cache.groups.size(); ++g) {
     CacheGroup& group = cache.groups[g];
-    const bool scaled = std::ranges::any_of(
-        group.lights, [&](const LightPlane& light) { return scale_of(scales, light.name) != kAsBaked; });
-    if (!scaled && group.eta == etas[g]) continue;
+    if (!is_changed(group, etas[g], scales)) continue;
     keep_alive(cache, relight_group(group, etas[g], scales));
   }
+}
+
+Cache ScaledCache::relit(std::span<const double> etas) const {
+  Cache result = cache;
+  relight(result, etas, scales);
+  return result;
+}
+
+std::array<std::vector<float>, 3> ScaledCache::irradiance(std::size_t g, double eta) const {
+  const CacheGroup& group = cache.groups[g];
+  if (is_changed(group, eta, scales)) return sum_lights(group, eta, scales, nullptr);
+  IrradiancePlanes planes;
+  for (std::size_t k = 0; k < 3; ++k) planes[k].assign(group.planes[7 + k].begin(), group.planes[7 + k].end());
+  return planes;
 }
 
 namespace {

@@ -41,8 +41,9 @@ struct SetRows : RunRows<kInterpolated, kRun> {
 
 HWY_INLINE void add_to(float* to, VK value) { hn::StoreU(hn::Add(hn::LoadU(K(), to), value), K(), to); }
 
-template <bool kInterpolated>
-HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec3& x,
+// With kOwnPowers each kernel sees a light of its own.
+template <bool kInterpolated, bool kOwnPowers>
+HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
                          std::span<double> totals) {
   const F df;
   constexpr std::size_t kRun = 256;
@@ -61,13 +62,20 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec
     const Float4* const power = list.powers() + begin;
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t v = 0; v < set.padded(); v += hn::Lanes(K())) {
+        const std::size_t first = k * set.padded() + v;
+        const auto power_of = [&](std::size_t i) HWY_ATTR {
+          if constexpr (kOwnPowers)
+            return hn::LoadU(K(), powers + power_row(power[i]) * set.width() + first);
+          else
+            return hn::Set(K(), power[i][k]);
+        };
         VK even = hn::Zero(K()), odd = even;
         std::size_t i = 0;
         for (; i + 1 < size; i += 2) {
-          even = hn::MulAdd(hn::Set(K(), power[i][k]), rows(i, 0, k * set.padded() + v), even);
-          odd = hn::MulAdd(hn::Set(K(), power[i + 1][k]), rows(i + 1, 0, k * set.padded() + v), odd);
+          even = hn::MulAdd(power_of(i), rows(i, 0, first), even);
+          odd = hn::MulAdd(power_of(i + 1), rows(i + 1, 0, first), odd);
         }
-        if (i < size) even = hn::MulAdd(hn::Set(K(), power[i][k]), rows(i, 0, k * set.padded() + v), even);
+        if (i < size) even = hn::MulAdd(power_of(i), rows(i, 0, first), even);
         HWY_ALIGN float sums[KernelSet::kLanes];
         hn::Store(hn::Add(even, odd), K(), sums);
         for (std::size_t lane = 0; lane < hn::Lanes(K()); ++lane)
@@ -76,20 +84,31 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec
   }
 }
 
-void add_set_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
-  if (set.interpolated())
-    add_list<true>(set, list, x, totals);
+// Calls `action` with two compile-time truths.
+template <class Action>
+HWY_INLINE void with_constants(bool a, bool b, const Action& action) {
+  constexpr std::true_type kYes;
+  constexpr std::false_type kNo;
+  if (a)
+    b ? action(kYes, kYes) : action(kYes, kNo);
   else
-    add_list<false>(set, list, x, totals);
+    b ? action(kNo, kYes) : action(kNo, kNo);
 }
 
-// What a source is weighted by, apart from kernels: its offset's monomials, and with second moments their
-// trace and twice what they stretch along the offset.
+void add_set_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
+                     std::span<double> totals) {
+  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+    add_list<interpolated.value, own.value>(set, list, powers, x, totals);
+  });
+}
+
+// What a source is weighted by, apart from kernels: its power, where that is the same for all of them, times
+// its offset's monomials, and with second moments times their trace and twice what they stretch along it.
 enum Weight { kOne, kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kTrace, kStretch, kWeights };
 
-template <bool kInterpolated, class Struct>
-HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::span<const std::uint32_t> far,
-                            const Vec3& centre, float* expansion) {
+template <bool kInterpolated, bool kOwnPowers, class Struct>
+HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const float* powers,
+                            std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
   const F df;
   constexpr std::size_t kRun = 128;
   constexpr bool kMoments = std::is_same_v<Struct, SumNode>;
@@ -117,8 +136,8 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
     }
     for (std::size_t k = 0; k < 3; ++k) {
       for (std::size_t i = 0; i < size; ++i) {
-        const float power = structs[indices[i]].power[k], x = offsets[i][0], y = offsets[i][1],
-                    z = offsets[i][2];
+        const float power = kOwnPowers ? 1 : structs[indices[i]].power[k], x = offsets[i][0],
+                    y = offsets[i][1], z = offsets[i][2];
         const float px = power * x, py = power * y, pz = power * z;
         float* const w = weights[i];
         w[kOne] = power;
@@ -143,8 +162,14 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
         for (std::size_t i = 0; i < size; ++i) {
           const float* const w = weights[i];
           const auto weight = [&](Weight which) HWY_ATTR { return hn::Set(K(), w[which]); };
-          const VK radial = jets(i, 0, lane), bend = jets(i, 1, lane);
-          value = hn::MulAdd(weight(kOne), values(i, 0, lane), value);
+          VK level = values(i, 0, lane), radial = jets(i, 0, lane), bend = jets(i, 1, lane);
+          if constexpr (kOwnPowers) {
+            const VK power = hn::LoadU(K(), powers + indices[i] * width + lane);
+            level = hn::Mul(level, power);
+            radial = hn::Mul(radial, power);
+            bend = hn::Mul(bend, power);
+          }
+          value = hn::MulAdd(weight(kOne), level, value);
           if constexpr (kMoments)
             value = hn::MulAdd(weight(kTrace), radial, hn::MulAdd(weight(kStretch), bend, value));
           trace = hn::MulAdd(weight(kOne), radial, trace);
@@ -174,19 +199,17 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, std::sp
   }
 }
 
-void add_set_nodes(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
-                   const Vec3& centre, float* expansion) {
-  if (set.interpolated())
-    add_structs<true>(set, nodes, far, centre, expansion);
-  else
-    add_structs<false>(set, nodes, far, centre, expansion);
+void add_set_nodes(const KernelSet& set, const SumNode* nodes, const float* powers,
+                   std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
+  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+    add_structs<interpolated.value, own.value>(set, nodes, powers, far, centre, expansion);
+  });
 }
-void add_set_samples(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
-                     const Vec3& centre, float* expansion) {
-  if (set.interpolated())
-    add_structs<true>(set, sources, far, centre, expansion);
-  else
-    add_structs<false>(set, sources, far, centre, expansion);
+void add_set_samples(const KernelSet& set, const SumSource* sources, const float* powers,
+                     std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
+  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+    add_structs<interpolated.value, own.value>(set, sources, powers, far, centre, expansion);
+  });
 }
 
 }  // namespace nacre::lanes::HWY_NAMESPACE
@@ -199,16 +222,17 @@ HWY_EXPORT(add_set_sources);
 HWY_EXPORT(add_set_nodes);
 HWY_EXPORT(add_set_samples);
 
-void add_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
-  HWY_DYNAMIC_DISPATCH(add_set_sources)(set, list, x, totals);
+void add_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
+                 std::span<double> totals) {
+  HWY_DYNAMIC_DISPATCH(add_set_sources)(set, list, powers, x, totals);
 }
-void add_series(const KernelSet& set, const SumNode* nodes, std::span<const std::uint32_t> far,
-                const Vec3& centre, SetExpansion& expansion) {
-  HWY_DYNAMIC_DISPATCH(add_set_nodes)(set, nodes, far, centre, expansion.data());
+void add_series(const KernelSet& set, const SumNode* nodes, const float* powers,
+                std::span<const std::uint32_t> far, const Vec3& centre, SetExpansion& expansion) {
+  HWY_DYNAMIC_DISPATCH(add_set_nodes)(set, nodes, powers, far, centre, expansion.data());
 }
-void add_series(const KernelSet& set, const SumSource* sources, std::span<const std::uint32_t> far,
-                const Vec3& centre, SetExpansion& expansion) {
-  HWY_DYNAMIC_DISPATCH(add_set_samples)(set, sources, far, centre, expansion.data());
+void add_series(const KernelSet& set, const SumSource* sources, const float* powers,
+                std::span<const std::uint32_t> far, const Vec3& centre, SetExpansion& expansion) {
+  HWY_DYNAMIC_DISPATCH(add_set_samples)(set, sources, powers, far, centre, expansion.data());
 }
 
 }  // namespace nacre::lanes

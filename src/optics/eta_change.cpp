@@ -79,6 +79,17 @@ std::array<double, kNodes> eta_weights(double eta) noexcept {
   return weights;
 }
 
+std::vector<double> entering_shares(double eta) {
+  const auto weights = eta_weights(eta);
+  std::vector<double> shares;
+  for (const double cosine : {0.1, 0.2, 0.35, 0.6, 1.0}) {
+    shares.push_back(0);
+    for (std::size_t j = 0; j < kNodes; ++j)
+      shares.back() += weights[j] * transmittance(double{kEtaNodes[j]}, cosine);
+  }
+  return shares;
+}
+
 EtaChange::EtaChange(double from, double to)
     : none_(from == to), from_(eta_weights(from)), to_(eta_weights(to)) {}
 

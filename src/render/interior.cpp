@@ -88,7 +88,7 @@ InteriorPoint ViewSegment::at(float distance) const {
 }
 
 Interior::Interior(const World& world, std::size_t medium)
-    : world_(world), medium_(static_cast<int>(medium)), eta_(world.scene->media[medium].eta()) {
+    : world_(world), medium_(static_cast<int>(medium)), eta_(world.media[medium].eta()) {
   int bodies = 0;
   for (const Shape& shape : world.scene->shapes) {
     const bool own = shape.medium == medium_;

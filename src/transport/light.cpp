@@ -68,7 +68,7 @@ LightSample sample_model(const Query& query, const ConstantLight& light) {
 }
 
 LightSample sample_model(const Query& query, const EnvironmentMap&) {
-  const Environment& map = *query.world.lights.map;
+  const Environment& map = *query.world.lights->map;
   float pdf = 0;
   const Vec3 direction = map.sample(query.u, pdf);
   if (!(pdf > 0)) return {};
@@ -78,7 +78,7 @@ LightSample sample_model(const Query& query, const EnvironmentMap&) {
 LightSample sample_model(const Query& query, const AreaLight& light) {
   const Mesh& mesh = query.world.scene->shapes[light.shape].mesh;
   const AreaSample sample =
-      sample_area_light(mesh, query.world.lights.triangles[query.light], query.x, query.u);
+      sample_area_light(mesh, query.world.lights->triangles[query.light], query.x, query.u);
   const Vec3 to_light = sample.point - query.x;
   const float distance = to_light.length();
   if (!(sample.pdf > 0) || !(distance > 0)) return {};
@@ -98,19 +98,19 @@ LightSample sample_light(const World& world, std::size_t light, const Vec3& x, c
 float pdf_light(const World& world, std::size_t light, const Vec3& x, const Hit& hit) noexcept {
   const auto* area = std::get_if<AreaLight>(&world.scene->lights[light].model);
   if (!area || !hit || hit.mesh != area->shape) return 0;
-  return pdf_area_light(world.shape(hit).mesh, world.lights.triangles[light], x, hit);
+  return pdf_area_light(world.shape(hit).mesh, world.lights->triangles[light], x, hit);
 }
 
 float pdf_light(const World& world, std::size_t light, const Vec3&, const Vec3& direction,
                 const Vec3& normal) noexcept {
-  if (light != world.lights.environment) return 0;
-  return world.lights.map ? world.lights.map->pdf(direction) : pdf_constant(direction, normal);
+  if (light != world.lights->environment) return 0;
+  return world.lights->map ? world.lights->map->pdf(direction) : pdf_constant(direction, normal);
 }
 
 Rgb environment_radiance(const World& world, const Vec3& direction) noexcept {
-  if (world.lights.environment == kNoLight || !world.sends(world.lights.environment)) return {0, 0, 0};
-  if (world.lights.map) return world.lights.map->radiance(direction);
-  return std::get<ConstantLight>(world.scene->lights[world.lights.environment].model).radiance;
+  if (world.lights->environment == kNoLight || !world.sends(world.lights->environment)) return {0, 0, 0};
+  if (world.lights->map) return world.lights->map->radiance(direction);
+  return std::get<ConstantLight>(world.scene->lights[world.lights->environment].model).radiance;
 }
 
 Rgb pass_glass(const World& world, const Hit& hit, const Vec3& direction) noexcept {
@@ -160,7 +160,7 @@ double distant_share(const LightTable& lights, const Vec3& x, const Vec3& normal
 }  // namespace
 
 LightChoice choose_light(const World& world, const Vec3& x, double u, const Vec3& normal) noexcept {
-  const LightTable& lights = world.lights;
+  const LightTable& lights = *world.lights;
   const double share = distant_share(lights, x, normal);
   if (u < share) {
     u = std::min(u / share, 1 - 0x1p-53);
@@ -174,7 +174,7 @@ LightChoice choose_light(const World& world, const Vec3& x, double u, const Vec3
 
 double probability_of_light(const World& world, const Vec3& x, std::size_t light,
                             const Vec3& normal) noexcept {
-  const LightTable& lights = world.lights;
+  const LightTable& lights = *world.lights;
   const double share = distant_share(lights, x, normal);
   const auto found = std::ranges::lower_bound(lights.distant, light);
   if (found != lights.distant.end() && *found == light)

@@ -63,7 +63,7 @@ Rgb emitted_radiance(const World& world, const PathRay& ray, const Hit& hit) noe
   if (!hit) {
     const Rgb radiance = environment_radiance(world, ray.ray.direction);
     if (ray.density == 0 || is_black(radiance)) return radiance;
-    const std::size_t light = world.lights.environment;
+    const std::size_t light = world.lights->environment;
     return radiance *
            ray_share(world, ray, light, pdf_light(world, light, ray.position, ray.ray.direction, ray.normal));
   }

@@ -59,7 +59,7 @@ Rgb surface_albedo(const World& world, const Hit& hit, bool entry) noexcept {
 
 Rgb exit_transmittance(const World& world, const Hit& hit, const SurfacePoint& point,
                        const Vec3& out) noexcept {
-  const Medium& medium = world.scene->media[static_cast<std::size_t>(world.shape(hit).medium)];
+  const Medium& medium = world.media[static_cast<std::size_t>(world.shape(hit).medium)];
   const float cosine = std::min(dot(point.normal_towards(out), out), 1.0f);
   return surface_albedo(world, hit, false) * (1 - fresnel_reflectance(cosine, medium.eta()));
 }

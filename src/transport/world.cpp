@@ -8,26 +8,41 @@ namespace nacre {
 World make_world(const Scene& scene, bool shadows) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  World world{&scene, RayTracer(meshes), {}, {}, shadows, {}};
+  World world{&scene, RayTracer(meshes), {}, {}, nullptr, shadows, {}};
   refresh(world);
   return world;
 }
 
-void refresh(World& world) {
+namespace {
+
+void make_bsdfs(World& world) {
   const Scene& scene = *world.scene;
-  world.lights = make_light_table(scene);
   world.bsdfs.clear();
   world.clear_glass.clear();
   world.has_glass = false;
   for (const Shape& shape : scene.shapes) {
     const Bsdf bsdf =
         make_bsdf(shape.surface == kNone ? nullptr : &scene.surfaces[static_cast<std::size_t>(shape.surface)],
-                  shape.medium == kNone ? nullptr : &scene.media[static_cast<std::size_t>(shape.medium)]);
+                  shape.medium == kNone ? nullptr : &world.media[static_cast<std::size_t>(shape.medium)]);
     const bool glass = bsdf.transmits && !bsdf.rough();
     world.clear_glass.push_back(glass);
     world.has_glass = world.has_glass || glass;
     world.bsdfs.push_back(bsdf);
   }
+}
+
+}  // namespace
+
+void refresh(World& world) {
+  world.media = world.scene->media;
+  world.lights = std::make_shared<const LightTable>(make_light_table(*world.scene));
+  make_bsdfs(world);
+}
+
+World fill_medium(World world, std::size_t medium, const Medium& material) {
+  world.media[medium] = material;
+  make_bsdfs(world);
+  return world;
 }
 
 SurfacePoint surface_point(const World& world, const Hit& hit) noexcept {

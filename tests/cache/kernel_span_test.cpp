@@ -8,20 +8,23 @@
 #include <cmath>
 
 #include "cache/sample_sets.h"
+#include "nacre/optics/eta_change.h"
 
 namespace nacre {
 namespace {
 
 using namespace testing_support;
 
-std::vector<std::array<Profile, 3>> make_sweep(ProfileKind kind, int count, float most) {
-  std::vector<std::array<Profile, 3>> profiles;
+std::vector<Response> make_sweep(ProfileKind kind, int count, float most, bool varies_eta = false) {
+  std::vector<Response> responses;
   for (int i = 0; i < count; ++i) {
     Medium medium = make_material("Marble", kind, 1);
     medium.sigma_a *= 1 + (most - 1) * static_cast<float>(i) / static_cast<float>(count - 1);
-    profiles.push_back(resolved_profiles(medium, 0.2));
+    if (varies_eta) medium.int_ior = 1.2f + 0.5f * static_cast<float>(i) / static_cast<float>(count - 1);
+    responses.push_back({resolved_profiles(medium, 0.2), {}});
+    if (varies_eta) responses.back().entering = entering_shares(double{medium.eta()});
   }
-  return profiles;
+  return responses;
 }
 
 class EveryKind : public testing::TestWithParam<ProfileKind> {};
@@ -32,38 +35,47 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind,
 // At distances that are none of those it was made from.
 TEST_P(EveryKind, CombinationsAreAsNearAsAsked) {
   constexpr double kFarthest = 60, kError = 5e-4;
-  const auto profiles = make_sweep(GetParam(), 40, 4);
-  const auto span = find_span(profiles, kFarthest, kError, 8);
-  ASSERT_TRUE(span);
-  EXPECT_LE(span->basis.size(), 16u);
-  EXPECT_EQ(span->basis.size() % 8, 0u);
-  for (std::size_t m = 0; m < profiles.size(); ++m)
-    for (std::size_t k = 0; k < 3; ++k)
-      for (double r = 0.0011; r < kFarthest; r *= 1.037) {
-        double sum = 0;
-        for (std::size_t j = 0; j < span->basis.size(); ++j)
-          sum += double{span->weights[m][j][k]} * eval_profile(profiles[span->basis[j][k]][k], r);
-        const double value = eval_profile(profiles[m][k], r);
-        ASSERT_NEAR(sum, value, 1.1 * kError * std::max(value, 1e-7 * profiles[m][k].total / (kPiD * r * r)))
-            << "material " << m << ", channel " << k << ", r " << r;
-      }
+  for (const bool varies_eta : {false, true}) {
+    const auto responses = make_sweep(GetParam(), 40, varies_eta ? 1.5f : 4.0f, varies_eta);
+    const auto span = find_span(responses, kFarthest, kError, 8);
+    ASSERT_TRUE(span);
+    EXPECT_LE(span->basis.size(), 16u);
+    EXPECT_EQ(span->basis.size() % 8, 0u);
+    for (std::size_t m = 0; m < responses.size(); ++m)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t angle = 0; angle < (varies_eta ? responses[m].entering.size() : 1); ++angle) {
+          const auto share = [&](const Response& r) { return varies_eta ? r.entering[angle] : 1; };
+          for (double r = 0.0011; r < kFarthest; r *= 1.037) {
+            double sum = 0;
+            for (std::size_t j = 0; j < span->basis.size(); ++j) {
+              const Response& base = responses[span->basis[j][k]];
+              sum += double{span->weights[m][j][k]} * share(base) * eval_profile(base.profiles[k], r);
+            }
+            const double value = eval_profile(responses[m].profiles[k], r),
+                         least = 1e-7 * responses[m].profiles[k].total / (kPiD * r * r);
+            ASSERT_NEAR(sum, share(responses[m]) * value,
+                        1.1 * kError * share(responses[m]) * std::max(value, least))
+                << "material " << m << ", channel " << k << ", r " << r << ", angle " << angle;
+          }
+        }
+  }
 }
 
 TEST(KernelSpan, IsNothingWhereItWouldBeNoFewer) {
-  const auto profiles = make_sweep(ProfileKind::kDipole, 40, 4);
-  EXPECT_FALSE(find_span(std::span(profiles).first(8), 60, 5e-4, 8));
-  EXPECT_FALSE(find_span(std::span(profiles).first(16), 60, 1e-12, 8));
+  const auto responses = make_sweep(ProfileKind::kDipole, 40, 4);
+  EXPECT_FALSE(find_span(std::span(responses).first(8), 60, 5e-4, 8));
+  EXPECT_FALSE(find_span(std::span(responses).first(16), 60, 1e-12, 8));
   EXPECT_FALSE(find_span(make_sweep(ProfileKind::kDipole, 16, 1e4), 60, 5e-4, 8));
 }
 
 // A channel that does not scatter, and one in which all are alike.
 TEST(KernelSpan, TakesChannelsAsTheyAre) {
-  auto profiles = make_sweep(ProfileKind::kDipole, 20, 3);
-  for (auto& channels : profiles) {
-    channels[0] = profiles[0][0];
-    channels[1] = Profile{};
+  auto responses = make_sweep(ProfileKind::kDipole, 20, 3);
+  for (Response& response : responses) {
+    response.profiles[0] = responses[0].profiles[0];
+    response.profiles[1] = Profile{};
   }
-  const auto span = find_span(profiles, 60, 5e-4, 8);
+  const auto span = find_span(responses, 60, 5e-4, 8);
   ASSERT_TRUE(span);
   for (const auto& weights : span->weights) {
     float same = 0;

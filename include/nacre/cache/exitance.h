@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -38,6 +39,9 @@ struct SumNode {
 
 class KernelSet;
 
+/// E_t of a group's samples for a relative index of refraction, plane by plane.
+using IrradianceForEta = std::function<std::array<std::vector<float>, 3>(double eta)>;
+
 /// What the relative error of a hierarchical sum is: its root mean square over a picture, or the largest.
 enum class Promise { kCalibrated, kCertified };
 
@@ -46,9 +50,11 @@ enum class Promise { kCalibrated, kCertified };
 class Exitance {
  public:
   /// `tolerance` is the relative error of the sum against eval_exact, with each material; 0 sums every
-  /// sample. Throws Error(kLimit) where it cannot be certified, being near the accuracy of the tables.
+  /// sample. Throws Error(kLimit) where it cannot be certified, being near the accuracy of the tables. The
+  /// irradiance of `group` is that for the family's least eta; where its members have several, which neither
+  /// a sum over every sample nor a certified one may, `irradiance` gives that for others.
   Exitance(const CacheGroup& group, const MaterialFamily& family, double tolerance,
-           Promise promise = Promise::kCalibrated);
+           Promise promise = Promise::kCalibrated, const IrradianceForEta& irradiance = {});
   Exitance(const CacheGroup& group, const Medium& medium, double tolerance,
            Promise promise = Promise::kCalibrated)
       : Exitance(group, MaterialFamily{{medium}}, tolerance, promise) {}
@@ -69,7 +75,7 @@ class Exitance {
   /// The same for points that are all there will ever be in the cells of level kWholeLevel in which they lie:
   /// the parts of those cells fit closely around them.
   void eval_whole(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
-  /// The same sum over every sample, in octree order.
+  /// The same sum over every sample, in octree order. Of materials with one eta.
   void eval_exact(std::span<const Vec3> points, std::span<Rgb> exitance, std::uint64_t& evaluations) const;
 
   /// The cell of a point, in Morton order; shifted right by 3 bits a level, the larger cell around it.
@@ -115,10 +121,21 @@ class Exitance {
   OctreeNode make_octree_node(std::uint32_t index) const noexcept;
   std::vector<Vec3> scaled(std::span<const Vec3> points) const;
   double lit_pieces(double radius) const;
-  void copy_octree();
-  void add_all_moments();
+  std::vector<std::uint32_t> copy_octree();
+  void add_all_moments(std::span<const Float4> other_light);
   Moments add_moments(std::uint32_t index, std::span<const std::uint32_t> known,
-                      std::span<const Moments> moments);
+                      std::span<const Moments> moments, std::span<const Float4> other_light);
+  void set_moments(SumNode& node, const Moments& sum) const;
+  void widen_moments(SumNode& node, const Moments& sum) const;
+  std::vector<Float4> source_powers(std::span<const std::uint32_t> origins, double eta,
+                                    const IrradianceForEta& irradiance) const;
+  void make_powers(std::span<const std::uint32_t> origins, double most_eta,
+                   const IrradianceForEta& irradiance);
+  // nullptr where all materials see the same light.
+  const float* source_powers() const noexcept { return powers_.size() > 0 ? powers_.data() : nullptr; }
+  const float* node_powers() const noexcept {
+    return powers_.size() > 0 ? powers_.data() + source_count_ * set_width_ : nullptr;
+  }
   void make_kernels(const MaterialFamily& family);
   void make_set(const MaterialFamily& family, double tolerance, double farthest);
   void make_tables();
@@ -131,6 +148,7 @@ class Exitance {
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
   Totals weigh(const Target& target, Room& room) const;
   void make_limits(const Target& target, Room& room) const;
+  void eval_outside(const Point& point, Room& room) const;
   void eval_point(const Target& target, const Point& point, Room& room) const;
   void eval_target(std::span<const Point> range, int level, const Target* parent, Room& room) const;
 
@@ -146,6 +164,11 @@ class Exitance {
   std::unique_ptr<const KernelSet> set_;  // where they are of a family: theirs, or what spans them
   std::vector<float> weights_;  // then, of each kernel of the set in each material: channel, kernel, material
   std::size_t kernel_count_ = 1;  // that are summed up
+  // Of families with several indices of refraction: whose light each kernel of the set sees, by channel, and
+  // the power of each source, then of each node, for each of them.
+  std::vector<std::array<double, 3>> kernel_etas_;
+  LargeArray<float> powers_;
+  std::size_t source_count_ = 0, node_count_ = 0, set_width_ = 0;
   std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;

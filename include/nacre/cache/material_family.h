@@ -23,8 +23,8 @@ struct MaterialFamily {
 inline constexpr std::size_t kFewMaterials = 8;
 
 /// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
-/// eta, whether it is an opaque surface, and a mean free path to three octaves: up to there it costs less to
-/// refine once, for the strictest, than to do so for several families.
+/// eta unless they may be mixed, whether it is an opaque surface, and a mean free path to three octaves: up to
+/// there it costs less to refine once, for the strictest, than to do so for several families.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
   std::vector<std::string> digests;  // of each, see family_digest
@@ -33,7 +33,7 @@ struct MaterialFamilies {
   };
   std::vector<Place> places;  // parallel to `media`
 };
-MaterialFamilies sort_materials(std::span<const Medium> media);
+MaterialFamilies sort_materials(std::span<const Medium> media, bool mixes_eta = false);
 
 /// The smallest mean free path of any channel of the media, in scene units.
 double shortest_length(std::span<const Medium> media);
@@ -43,10 +43,17 @@ double shortest_length(std::span<const Medium> media);
 using ChannelChoice = std::array<std::size_t, 3>;
 std::vector<ChannelChoice> find_extremes(std::span<const Medium> media);
 
+/// The least and the largest relative index of refraction of the members.
+struct EtaRange {
+  float least, most;
+  bool is_mixed() const { return least < most; }
+};
+EtaRange eta_range(const MaterialFamily& family);
+
 /// By channel, the least and the largest extinction coefficient sigma_t of the members, per scene unit.
 std::array<Rgb, 2> find_extinctions(std::span<const Medium> media);
 
-/// The members, by index, in groups in which no channel's extinction coefficient differs by more than half an
+/// The members, by index, in groups of one eta in which no channel's extinction coefficient differs by more than half an
 /// octave from that of the group's first: distances that light goes before it scatters serve all of them.
 std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medium> media);
 

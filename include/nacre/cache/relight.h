@@ -24,6 +24,18 @@ bool serves_eta(const CacheGroup& group, double eta) noexcept;
 /// was baked are those of the file.
 void relight(Cache& cache, std::span<const double> etas, std::span<const LightScale> scales);
 
+/// A cache as it was baked, and what its lights are multiplied by: from it comes the irradiance for any index
+/// of refraction that it serves.
+struct ScaledCache {
+  Cache cache;
+  std::vector<LightScale> scales;
+
+  /// The cache with each group relit, see relight(); the storage is shared where nothing changes.
+  Cache relit(std::span<const double> etas) const;
+  /// E_t of the samples of group `g` for an index, plane by plane: the numbers that relit() gives.
+  std::array<std::vector<float>, 3> irradiance(std::size_t g, double eta) const;
+};
+
 /// Adds the planes of light of `more`, a bake of the same samples under other lights, to a cache, whose
 /// fingerprint becomes that of `more`. Throws Error(kMismatch, place) where samples are not the same, or
 /// either does not keep its lights apart.

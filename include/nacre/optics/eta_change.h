@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "nacre/base/math.h"
 
@@ -26,6 +27,9 @@ EtaRatios encode_eta_ratios(std::span<const Rgb, kEtaNodes.size()> transmitted) 
 
 /// Weights c_j with F_t(eta, mu) = sum c_j F_t(kEtaNodes[j], mu), by least squares of relative errors.
 std::array<double, kEtaNodes.size()> eta_weights(double eta) noexcept;
+
+/// What those sums give for F_t(eta, mu) at a few cosines mu from grazing to 1.
+std::vector<double> entering_shares(double eta);
 
 /// From E_t for one index to that for another, both in [kLeastEta, kMostEta].
 class EtaChange {

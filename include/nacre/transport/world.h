@@ -1,6 +1,7 @@
 // A scene made ready for light transport: acceleration structure, light and surface tables.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "nacre/geometry/ray_tracer.h"
@@ -10,13 +11,15 @@
 
 namespace nacre {
 
-/// Everything that tracing light needs; copies share the acceleration structure. The scene has to outlive it
+/// Everything that tracing light needs; copies share the acceleration structure and the
+/// tables of lights. The scene has to outlive it
 /// unchanged.
 struct World {
   const Scene* scene;
   RayTracer tracer;         // mesh i is Scene::shapes[i]
-  std::vector<Bsdf> bsdfs;  // parallel to Scene::shapes
-  LightTable lights;
+  std::vector<Bsdf> bsdfs;    // parallel to Scene::shapes
+  std::vector<Medium> media;  // parallel to Scene::media: those, or what fills them instead
+  std::shared_ptr<const LightTable> lights;
   bool shadows = true;
   std::vector<std::uint8_t> clear_glass;  // by shape: whether light passes straight through (see_light)
   bool has_glass = false;                 // any of them
@@ -30,6 +33,8 @@ struct World {
 World make_world(const Scene& scene, bool shadows);
 /// Follows its scene after media, surfaces or lights have changed, but no mesh. Throws as make_world.
 void refresh(World& world);
+/// The same world with another material in one of its media.
+World fill_medium(World world, std::size_t medium, const Medium& material);
 
 /// Where a ray met a surface.
 struct SurfacePoint {
