@@ -98,32 +98,44 @@ void scale_lights(Scene& scene, const std::vector<Rgb>& scales) {
     if (scales[i] != Rgb(1, 1, 1)) scale_light(scene.lights[i], scales[i]);
 }
 
-Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,
-                          const std::vector<Rgb>& light_scales, Report& report) {
+ScaledCache load_scaled_cache(const std::string& path, const Scene& scene, bool shadows,
+                              const std::vector<Rgb>& light_scales, Report& report) {
   const StageTimer timer(report, "read_cache");
-  Cache cache = load_cache(path);
+  ScaledCache scaled{load_cache(path), {}};
+  Cache& cache = scaled.cache;
   BakeConditions conditions = fingerprint_conditions(cache.fingerprint, scene.media.size());
   conditions.shadows = shadows;
   const std::string mismatch = describe_mismatch(cache.fingerprint, make_fingerprint(scene, conditions));
   if (!mismatch.empty() || cache.groups.size() != scene.media.size())
     fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
          mismatch.empty() ? "the number of translucent groups differs" : mismatch);
-  std::vector<double> etas;
-  std::vector<LightScale> scales;
   for (std::size_t m = 0; m < cache.groups.size(); ++m) {
-    const CacheGroup& group = cache.groups[m];
     // With eta in the fingerprint it is the one that was baked.
-    etas.push_back(conditions.every_eta ? double{scene.media[m].eta()} : group.eta);
-    if (!serves_eta(group, etas[m]))
-      fail(ErrorCode::kMismatch, path,
-           "the cache holds irradiance for {}, and the index of refraction of {} is {:.6g}; bake it again",
-           group.lights.empty() ? fmt::format("an index of refraction of {:.6g} alone", group.eta)
-                                : fmt::format("indices of refraction from {} to {}", kLeastEta, kMostEta),
-           medium_label(scene, m), etas[m]);
-    scales = scale_planes(group, scene, light_scales, path);
+    if (!conditions.every_eta) cache.groups[m].eta = double{scene.media[m].eta()};
+    check_eta(scaled, scene, m, scene.media[m].eta(), path);
+    scaled.scales = scale_planes(cache.groups[m], scene, light_scales, path);
   }
-  relight(cache, etas, scales);
-  return cache;
+  return scaled;
+}
+
+void check_eta(const ScaledCache& scaled, const Scene& scene, std::size_t medium, float eta,
+               const std::string& path) {
+  const CacheGroup& group = scaled.cache.groups[medium];
+  if (!serves_eta(group, double{eta}))
+    fail(ErrorCode::kMismatch, path,
+         "the cache holds irradiance for {}, and the index of refraction of {} is {:.6g}; bake it again",
+         group.lights.empty() ? fmt::format("an index of refraction of {:.6g} alone", group.eta)
+                              : fmt::format("indices of refraction from {} to {}", kLeastEta, kMostEta),
+         medium_label(scene, medium), eta);
+}
+
+Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,
+                          const std::vector<Rgb>& light_scales, Report& report) {
+  const ScaledCache scaled = load_scaled_cache(path, scene, shadows, light_scales, report);
+  const StageTimer timer(report, "read_cache");
+  std::vector<double> etas;
+  for (const Medium& medium : scene.media) etas.push_back(double{medium.eta()});
+  return scaled.relit(etas);
 }
 
 std::vector<std::string> find_new_lights(const std::string& path, const Cache& cache, const Scene& scene,

@@ -20,9 +20,9 @@ namespace {
 // Pictures that are rendered together: what they may take, bytes a pixel of one of them, and how many.
 constexpr std::size_t kBatchBytes = std::size_t{4} << 30, kPixelBytes = 220, kLargestBatch = 16;
 
-// Renders points that share camera, lights and eta, and so everything but what their materials make of it.
+// Renders points that share camera and lights, and so everything but what their materials make of it.
 void render_batch(const SweepOptions& options, std::size_t medium, const MaterialFamilies& materials,
-                  std::span<const SweepPoint* const> batch, const World& world, const Cache& cache,
+                  std::span<const SweepPoint* const> batch, const World& world, const ScaledCache& cache,
                   Session& session) {
   const Scene& scene = *world.scene;
   const RenderParams params = make_render_params(options, scene, batch[0]->camera);
@@ -41,7 +41,7 @@ void render_batch(const SweepOptions& options, std::size_t medium, const Materia
     images[i].metadata = {{"nacre:version", kVersion},
                           {"nacre:command", describe_command(options, point)},
                           {"nacre:seed", fmt::format("{}", options.common.seed)},
-                          {"nacre:fingerprint", fingerprint_digest(cache.fingerprint)}};
+                          {"nacre:fingerprint", fingerprint_digest(cache.cache.fingerprint)}};
     if (images[i].width < images[i].full_width || images[i].height < images[i].full_height)
       images[i].metadata[kSettingsKey] = point.whole;
     const std::string path = options.output + "/" + picture_name(point.index) + ".exr";
@@ -63,32 +63,33 @@ void render_points(const SweepOptions& options, Scene& scene, std::size_t medium
     const StageTimer timer(session.report(), "build_bvh");
     return make_world(scene, !options.bake.no_shadows);
   }();
-  using Group = std::tuple<std::vector<std::string>, float, std::string>;
+  using Group = std::pair<std::vector<std::string>, std::string>;  // lights, camera
   std::map<Group, std::vector<const SweepPoint*>> groups;
-  for (const SweepPoint* const point : points)
-    groups[{point->lights, point->material.eta(), point->camera}].push_back(point);
+  for (const SweepPoint* const point : points) groups[{point->lights, point->camera}].push_back(point);
   const RenderParams first = make_render_params(options, scene, options.camera);
   const auto pixels =
       static_cast<std::size_t>(first.crop_width) * static_cast<std::size_t>(first.crop_height);
   const std::size_t together =
       std::clamp<std::size_t>(kBatchBytes / (pixels * kPixelBytes), 1, kLargestBatch);
   bool density_checked = false;
-  std::optional<Cache> cache;
+  std::optional<ScaledCache> cache;
   const Group* last = nullptr;
   for (auto& [group, members] : groups) {
     std::ranges::stable_sort(members, {},
                              [&](const SweepPoint* p) { return materials.places[p->index].family; });
     // Neighbouring groups mostly differ in the camera alone.
-    if (!last || std::get<0>(*last) != std::get<0>(group) || std::get<1>(*last) != std::get<1>(group)) {
+    if (!last || last->first != group.first) {
       scene.media = media;
       scene.lights = lights;
       if (!scene.media.empty()) {
         scene.media[medium].ext_ior = members[0]->material.ext_ior;
         scene.media[medium].int_ior = members[0]->material.int_ior;
       }
-      const std::vector<Rgb> scales = find_light_scales(scene, std::get<0>(group));
+      const std::vector<Rgb> scales = find_light_scales(scene, group.first);
       cache.emplace(
-          load_matching_cache(options.cache, scene, !options.bake.no_shadows, scales, session.report()));
+          load_scaled_cache(options.cache, scene, !options.bake.no_shadows, scales, session.report()));
+      for (const SweepPoint* const point : members)
+        if (!scene.media.empty()) check_eta(*cache, scene, medium, point->material.eta(), options.cache);
       scale_lights(scene, scales);
       refresh(world);
     }
@@ -99,7 +100,7 @@ void render_points(const SweepOptions& options, Scene& scene, std::size_t medium
       scene.media[medium] = (*std::ranges::min_element(points, {}, [](const SweepPoint* p) {
                               return smallest_mean_free_path(p->material) / p->material.scale;
                             }))->material;
-      session.warn(check_density(scene, *cache));
+      session.warn(check_density(scene, cache->cache));
       scene.media[medium] = kept;
       density_checked = true;
     }
@@ -177,7 +178,8 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     points.push_back(make_sweep_point(options, scene, medium, i, plan.points[i]));
     media.push_back(points.back().material);
   }
-  const MaterialFamilies materials = sort_materials(media);
+  const MaterialFamilies materials =
+      sort_materials(media, mixes_eta(make_render_params(options, scene, options.camera)));
   for (SweepPoint& point : points) {
     point.key = make_sweep_key(conditions, point, materials);
     point.whole = make_sweep_key(of_whole, point, materials);

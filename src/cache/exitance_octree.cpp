@@ -233,7 +233,8 @@ void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_e
     const std::vector<Float4> powers = source_powers(origins, eta, irradiance);
     parallel_for(powers.size(), kRun, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        for (const std::size_t lane : lanes) powers_[i * set_width_ + lane] = powers[i][lane / set_->padded()];
+        for (const std::size_t lane : lanes)
+          powers_[i * set_width_ + lane] = powers[i][lane / set_->padded()];
     });
   }
   for (std::uint32_t i = 0; i < source_count_; ++i) sources_[i].power = with_row(sources_[i].power, i);

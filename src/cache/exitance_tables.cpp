@@ -79,7 +79,8 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
     origin_[axis] = (std::floor(double{least[axis]} / cell_size_) - (1 << kBlockLevels)) * cell_size_;
   const EtaRange etas = eta_range(family);
   if (etas.is_mixed() && (!(tolerance > 0) || promise == Promise::kCertified || !irradiance))
-    fail(ErrorCode::kValue, group.name, "materials of several indices of refraction are summed up one by one");
+    fail(ErrorCode::kValue, group.name,
+         "materials of several indices of refraction are summed up one by one");
   if (!(tolerance > 0)) return;
   if (promise == Promise::kCertified) {
     double tables = 0, jets = 0;

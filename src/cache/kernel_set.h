@@ -55,7 +55,9 @@ class SetExpansion {
 };
 
 /// The row that a power is that of, kept where a fourth channel would be.
-inline std::uint32_t power_row(const Float4& power) noexcept { return std::bit_cast<std::uint32_t>(power[3]); }
+inline std::uint32_t power_row(const Float4& power) noexcept {
+  return std::bit_cast<std::uint32_t>(power[3]);
+}
 inline Float4 with_row(Float4 power, std::uint32_t row) noexcept {
   power[3] = std::bit_cast<float>(row);
   return power;

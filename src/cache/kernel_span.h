@@ -29,8 +29,8 @@ struct KernelSpan {
 
 /// The fewest materials, rounded up to a multiple of `step`, that span the responses of all to a relative
 /// error of at most `error` at every angle (all have the same number) and every distance up to `farthest`;
-/// beyond where R_d is a ten-millionth of its mean over the disc that reaches there, relative to that. Nothing
-/// if they would be no fewer than all.
+/// beyond where R_d is a ten-millionth of its mean over the disc that reaches there, relative to that.
+/// Nothing if they would be no fewer than all.
 std::optional<KernelSpan> find_span(std::span<const Response> responses, double farthest, double error,
                                     std::size_t step);
 

@@ -108,7 +108,8 @@ std::array<std::vector<float>, 3> ScaledCache::irradiance(std::size_t g, double 
   const CacheGroup& group = cache.groups[g];
   if (is_changed(group, eta, scales)) return sum_lights(group, eta, scales, nullptr);
   IrradiancePlanes planes;
-  for (std::size_t k = 0; k < 3; ++k) planes[k].assign(group.planes[7 + k].begin(), group.planes[7 + k].end());
+  for (std::size_t k = 0; k < 3; ++k)
+    planes[k].assign(group.planes[7 + k].begin(), group.planes[7 + k].end());
   return planes;
 }
 

@@ -35,14 +35,20 @@ class StageClock {
 
 }  // namespace
 
-PixelLoop::PixelLoop(const World& world, std::span<const Filling> media, const RenderParams& params)
-    : world_(world),
+PixelLoop::PixelLoop(const Boundaries& boundaries, std::span<const Filling> media, const RenderParams& params)
+    : boundaries_(boundaries),
+      world_(boundaries.worlds[0]),
       params_(params),
-      camera_(world.scene->cameras[params.camera], params.width, params.height),
-      filter_(world.scene->films[params.camera]),
-      light_samples_(world.scene->integrator.emitter_samples),
+      camera_(world_.scene->cameras[params.camera], params.width, params.height),
+      filter_(world_.scene->films[params.camera]),
+      light_samples_(world_.scene->integrator.emitter_samples),
       media_(media) {
-  const Integrator& integrator = world.scene->integrator;
+  const auto count = static_cast<std::uint32_t>(boundaries.worlds.size());
+  audiences_.push_back({kEvery, {}});
+  for (std::uint32_t b = 0; b < count; ++b) audiences_.push_back({b, {}});
+  for (std::size_t p = 0; p < boundaries.of_picture.size(); ++p)
+    for (const std::uint32_t i : {0u, 1 + boundaries.of_picture[p]}) audiences_[i].pictures.push_back(p);
+  const Integrator& integrator = world_.scene->integrator;
   counts_mirrors_ = integrator.kind == IntegratorKind::kPath;
   depth_limit_ = !counts_mirrors_ ? 2 : integrator.max_depth < 0 ? kMaxWaves : integrator.max_depth;
   wave_limit_ = counts_mirrors_ ? std::min(depth_limit_, kMaxWaves) : kMaxDirectWaves;
@@ -64,7 +70,7 @@ void PixelLoop::render_tile(const Tile& tile, std::span<PixelBuffer> pictures, T
       const StageClock clock(totals.surface);
       record_first_hits(paths, pictures);
     }
-    add_translucency(paths, wave, pictures, totals);
+    for (const Audience& audience : audiences_) add_translucency(paths, audience, wave, pictures, totals);
     const StageClock clock(totals.surface);
     next.clear();
     for (const Path& path : paths) shade(path, wave, pictures, next);
@@ -148,21 +154,26 @@ void PixelLoop::record_first_hits(std::vector<Path>& paths, std::span<PixelBuffe
 }
 
 // The points of one medium together, so that those near each other share their work.
-void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::span<PixelBuffer> pictures,
-                                 Totals& totals) const {
+void PixelLoop::add_translucency(const std::vector<Path>& paths, const Audience& audience, int wave,
+                                 std::span<PixelBuffer> pictures, Totals& totals) const {
   std::vector<const Path*> owners;
   std::vector<Hit> hits;
   std::vector<ExitPoint> points;
-  std::vector<Rgb> transmittances;
   for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
     owners.clear();
     hits.clear();
     points.clear();
-    transmittances.clear();
+    // Those that the audience sees through.
+    std::vector<std::uint32_t> boundaries{audience.boundary};
+    if (audience.boundary == kEvery) boundaries[0] = 0;
+    if (audience.boundary == kEvery && m == boundaries_.medium)
+      for (std::uint32_t b = 1; b < boundaries_.worlds.size(); ++b) boundaries.push_back(b);
+    std::vector<std::vector<Rgb>> transmittances(boundaries_.worlds.size());
     {
       const StageClock clock(totals.surface);
       for (const Path& path : paths) {
-        if (!path.hit || path.depth >= depth_limit_ || world_.shape(path.hit).medium != static_cast<int>(m))
+        if (!path.hit || path.depth >= depth_limit_ || path.boundary != audience.boundary ||
+            world_.shape(path.hit).medium != static_cast<int>(m))
           continue;
         owners.push_back(&path);
         hits.push_back(path.hit);
@@ -170,8 +181,9 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
             {path.hit, surface_point(world_, path.hit), -path.ray.ray.direction,
              pixel_key(path.pixel, 200 + hash_words(static_cast<std::uint64_t>(wave), path.branch)),
              path.sample});
-        transmittances.push_back(
-            exit_transmittance(world_, path.hit, points.back().surface, points.back().out));
+        for (const std::uint32_t b : boundaries)
+          transmittances[b].push_back(
+              exit_transmittance(boundaries_.worlds[b], path.hit, points.back().surface, points.back().out));
       }
       totals.shading_points += points.size();
     }
@@ -179,10 +191,15 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
     const Filling& filling = media_[m];
     // By family, all materials of a point side by side.
     std::vector<std::vector<Rgb>> exitances(filling.families.size()), scattered(filling.families.size());
+    const auto is_seen = [&](std::size_t f) {
+      return std::ranges::any_of(audience.pictures,
+                                 [&](std::size_t p) { return filling.of_picture[p].family == f; });
+    };
     {
       const StageClock clock(totals.diffusion);
       std::uint64_t evaluations = 0;
       for (std::size_t f = 0; f < exitances.size(); ++f) {
+        if (!is_seen(f)) continue;
         const Translucency& family = filling.families[f];
         exitances[f].resize(points.size() * family.material_count());
         family.eval_diffusion(hits, points, exitances[f], evaluations);
@@ -191,46 +208,63 @@ void PixelLoop::add_translucency(const std::vector<Path>& paths, int wave, std::
     }
     for (std::size_t f = 0; f < scattered.size(); ++f) {
       const Translucency& family = filling.families[f];
-      if (!family.has_single_scattering()) continue;
+      if (!family.has_single_scattering() || !is_seen(f)) continue;
       const StageClock clock(totals.single);
       const std::size_t count = family.material_count();
       scattered[f].resize(points.size() * count);
       LostSamples lost;
       for (std::size_t i = 0; i < points.size(); ++i)
-        family.estimate_single_scattering(points[i], lost, std::span(scattered[f]).subspan(i * count, count));
+        for (const std::uint32_t b : boundaries)
+          family.estimate_single_scattering(m == boundaries_.medium ? b : 0, points[i], lost,
+                                            std::span(scattered[f]).subspan(i * count, count));
       totals.lost[m] += lost.lost;
       totals.taken[m] += lost.taken;
     }
     const StageClock clock(totals.surface);
-    for (std::size_t p = 0; p < pictures.size(); ++p) {
+    for (const std::size_t p : audience.pictures) {
       const auto [f, material] = filling.of_picture[p];
       const Translucency& family = filling.families[f];
-      const auto add = [&](Layer layer, std::size_t i, const Rgb& radiance) {
+      const auto add_to = [&](Layer layer, std::size_t i, const Rgb& radiance) {
         pictures[p].add(wave == 0 ? layer : owners[i]->layer, owners[i]->pixel,
                         owners[i]->throughput * radiance);
       };
+      const std::vector<Rgb>& leaving =
+          transmittances[boundaries.size() > 1 ? boundaries_.of_picture[p] : boundaries[0]];
       const std::size_t count = family.material_count();
       for (std::size_t i = 0; i < points.size(); ++i)
-        add(Layer::kDiffusion, i,
-            exitances[f][i * count + material] * (transmittances[i] * family.exit_factor(material)));
+        add_to(Layer::kDiffusion, i,
+               exitances[f][i * count + material] * (leaving[i] * family.exit_factor(material)));
       for (std::size_t i = 0; i < points.size() && !scattered[f].empty(); ++i)
-        add(Layer::kSingle, i, scattered[f][i * count + material]);
+        add_to(Layer::kSingle, i, scattered[f][i * count + material]);
     }
   }
 }
 
-// Adds what a path meets on surfaces, and follows it on.
+void PixelLoop::add(const Path& path, Layer layer, const Rgb& value, std::span<PixelBuffer> pictures) const {
+  if (value == Rgb(0, 0, 0)) return;  // there are as many as pictures to add it to
+  for (const std::size_t p : audience(path.boundary).pictures) pictures[p].add(layer, path.pixel, value);
+}
+
+// Adds what a path meets on surfaces, and follows it on: by each boundary that the audience sees.
 void PixelLoop::shade(const Path& path, int wave, std::span<PixelBuffer> pictures,
                       std::vector<Path>& next) const {
-  const auto add = [&](Layer layer, const Rgb& value) {
-    if (value == Rgb(0, 0, 0)) return;  // there are as many as pictures to add it to
-    for (PixelBuffer& pixels : pictures) pixels.add(layer, path.pixel, value);
-  };
-  add(path.layer, path.throughput * emitted_radiance(world_, path.ray, path.hit));
+  add(path, path.layer, path.throughput * emitted_radiance(world_of(path.boundary), path.ray, path.hit),
+      pictures);
   if (!path.hit || path.depth >= depth_limit_) return;
-  ScatterPoint at = scatter_point(world_, path.hit, -path.ray.ray.direction);
+  const bool parts = path.boundary == kEvery && boundaries_.worlds.size() > 1 &&
+                     world_.shape(path.hit).medium == static_cast<int>(boundaries_.medium);
+  if (!parts) return scatter(path, wave, pictures, next);
+  Path part = path;
+  for (part.boundary = 0; part.boundary < boundaries_.worlds.size(); ++part.boundary)
+    scatter(part, wave, pictures, next);
+}
+
+void PixelLoop::scatter(const Path& path, int wave, std::span<PixelBuffer> pictures,
+                        std::vector<Path>& next) const {
+  const World& world = world_of(path.boundary);
+  ScatterPoint at = scatter_point(world, path.hit, -path.ray.ray.direction);
   Bsdf& bsdf = at.surface.bsdf;
-  const bool translucent = world_.shape(path.hit).medium != kNone;
+  const bool translucent = world.shape(path.hit).medium != kNone;
   const Layer layer = wave == 0 && translucent ? Layer::kSpecular : path.layer;
   const std::uint64_t key =
       pixel_key(path.pixel, hash_words(1, static_cast<std::uint64_t>(wave), path.branch));
@@ -246,10 +280,12 @@ void PixelLoop::shade(const Path& path, int wave, std::span<PixelBuffer> picture
     bsdf.specular = false;
   }
   const int samples = path.scattered == 0 ? light_samples_ : 1;
-  add(layer, path.throughput * reflect_direct_light(world_, at, samples, key,
-                                                    path.sample * static_cast<std::uint32_t>(samples),
-                                                    Continuation::kGoesOn));
-  follow(path, next_ray(world_, at, path.ray, samples, key, path.sample), layer, key, next);
+  add(path, layer,
+      path.throughput * reflect_direct_light(world, at, samples, key,
+                                             path.sample * static_cast<std::uint32_t>(samples),
+                                             Continuation::kGoesOn),
+      pictures);
+  follow(path, next_ray(world, at, path.ray, samples, key, path.sample), layer, key, next);
 }
 
 void PixelLoop::follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,

@@ -32,11 +32,20 @@ struct Filling {
   std::vector<MaterialFamilies::Place> of_picture;  // index: which of the wanted
 };
 
+/// The boundaries of the medium that pictures differ in: the world with each index of refraction, and which
+/// of them each picture has.
+struct Boundaries {
+  std::size_t medium;
+  std::vector<World> worlds;
+  std::vector<std::uint32_t> of_picture;
+};
+
 class PixelLoop {
  public:
   /// `media` are parallel to Scene::media. Pictures differ in what fills them: they share all rays, and what
-  /// surfaces reflect. All have to outlive it.
-  PixelLoop(const World& world, std::span<const Filling> media, const RenderParams& params);
+  /// surfaces reflect, from where a way meets a boundary that differs those that have the same. All have to
+  /// outlive it.
+  PixelLoop(const Boundaries& boundaries, std::span<const Filling> media, const RenderParams& params);
   /// Adds the samples of the pixels of a tile, to a buffer for each picture.
   void render_tile(const Tile& tile, std::span<PixelBuffer> pictures, Totals& totals) const;
   /// What the first sample of a pixel sees.
@@ -50,11 +59,24 @@ class PixelLoop {
     std::uint32_t pixel = 0;   // index into the rendered rectangle
     std::uint32_t sample = 0;  // of the pixel
     Layer layer = Layer::kSurface;
-    int depth = 1;             // edges that count towards the integrator's limit, this ray included
-    int scattered = 0;         // of them, how many come after a diffuse or rough surface
-    std::uint32_t branch = 1;  // which of the ways through mirrors and glass this one is
+    int depth = 1;                    // edges that count towards the integrator's limit, this ray included
+    int scattered = 0;                // of them, how many come after a diffuse or rough surface
+    std::uint32_t branch = 1;         // which of the ways through mirrors and glass this one is
+    std::uint32_t boundary = kEvery;  // that it has met, and whose pictures alone it belongs to
     Hit hit;
   };
+  static constexpr std::uint32_t kEvery = 0xffffffffu;
+  // The pictures that ways of one boundary, or of none yet, belong to.
+  struct Audience {
+    std::uint32_t boundary;
+    std::vector<std::size_t> pictures;
+  };
+  const Audience& audience(std::uint32_t boundary) const {
+    return audiences_[boundary == kEvery ? 0 : 1 + boundary];
+  }
+  const World& world_of(std::uint32_t boundary) const {
+    return boundaries_.worlds[boundary == kEvery ? 0 : boundary];
+  }
 
   // What the samples of a pixel share.
   struct PixelStart {
@@ -71,13 +93,17 @@ class PixelLoop {
   std::uint64_t pixel_key(std::uint32_t pixel, std::uint64_t purpose) const;
   std::vector<Path> start_paths(const Tile& tile, std::span<PixelBuffer> pictures) const;
   void record_first_hits(std::vector<Path>& paths, std::span<PixelBuffer> pictures) const;
-  void add_translucency(const std::vector<Path>& paths, int wave, std::span<PixelBuffer> pictures,
-                        Totals& totals) const;
+  void add_translucency(const std::vector<Path>& paths, const Audience& audience, int wave,
+                        std::span<PixelBuffer> pictures, Totals& totals) const;
+  void add(const Path& path, Layer layer, const Rgb& value, std::span<PixelBuffer> pictures) const;
   void shade(const Path& path, int wave, std::span<PixelBuffer> pictures, std::vector<Path>& next) const;
+  void scatter(const Path& path, int wave, std::span<PixelBuffer> pictures, std::vector<Path>& next) const;
   void follow(const Path& from, const NextRay& ray, Layer layer, std::uint64_t key,
               std::vector<Path>& next) const;
 
-  const World& world_;
+  const Boundaries& boundaries_;
+  std::vector<Audience> audiences_;  // of ways that have met no boundary, then of each
+  const World& world_;               // any: for what does not depend on boundaries
   const RenderParams& params_;
   CameraRays camera_;
   FilterSampler filter_;

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kPathsPerTile = 1 << 14;
 constexpr std::uint32_t kUnused = 0xffffffffu;
+constexpr std::size_t kNoMedium = std::numeric_limits<std::size_t>::max();
 
 // Pixels that are looked at, a hundred for each that is wanted, before hardly any shows a translucent
 // surface.
@@ -64,7 +65,31 @@ std::pair<std::vector<MaterialFamily>, std::vector<MaterialFamilies::Place>> cho
   return {families, of_picture};
 }
 
+// A world for each index of refraction that is wanted.
+Boundaries make_boundaries(const World& world, const MaterialSweep& sweep) {
+  if (sweep.medium >= world.media.size())
+    return {kNoMedium, {world}, std::vector<std::uint32_t>(sweep.wanted.size(), 0)};
+  Boundaries boundaries{sweep.medium, {}, {}};
+  for (const std::uint32_t index : sweep.wanted) {
+    const auto [f, member] = sweep.plan.places[index];
+    const Medium& material = sweep.plan.families[f].media[member];
+    std::vector<World>& worlds = boundaries.worlds;
+    const auto found = std::ranges::find(worlds, material.eta(),
+                                         [&](const World& w) { return w.media[sweep.medium].eta(); });
+    boundaries.of_picture.push_back(static_cast<std::uint32_t>(found - worlds.begin()));
+    if (found == worlds.end()) {
+      Medium medium = world.media[sweep.medium];
+      medium.int_ior = material.int_ior;
+      medium.ext_ior = material.ext_ior;
+      worlds.push_back(fill_medium(world, sweep.medium, medium));
+    }
+  }
+  return boundaries;
+}
+
 }  // namespace
+
+const World& Renderer::world() const { return boundaries_->worlds[0]; }
 
 RenderParams default_render_params(const Scene& scene, std::size_t camera) {
   RenderParams params;
@@ -76,24 +101,39 @@ RenderParams default_render_params(const Scene& scene, std::size_t camera) {
 }
 
 Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report)
-    : Renderer(world, cache, params, report, MaterialSweep{world.scene->media.size(), {}, {0}}) {}
-
-Renderer::Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
-                   const MaterialSweep& sweep)
-    : world_(world), pictures_(sweep.wanted.size()) {
+    : boundaries_(std::make_unique<const Boundaries>(Boundaries{kNoMedium, {world}, {0}})) {
   const StageTimer timer(report, "diffusion");  // tables of profiles, nodes on surfaces
-  const std::vector<Medium>& media = world.scene->media;
-  for (std::size_t m = 0; m < media.size(); ++m) {
-    const CacheGroup* const group = m < cache.groups.size() ? &cache.groups[m] : nullptr;
+  for (std::size_t m = 0; m < world.media.size(); ++m) {
+    Filling& filling = media_.emplace_back();
+    filling.families.emplace_back(boundaries_->worlds, m, MaterialFamily{{world.media[m]}},
+                                  m < cache.groups.size() ? &cache.groups[m] : nullptr, params);
+    filling.of_picture = {{0, 0}};
+  }
+}
+
+Renderer::Renderer(const World& world, const ScaledCache& cache, const RenderParams& params, Report& report,
+                   const MaterialSweep& sweep)
+    : boundaries_(std::make_unique<const Boundaries>(make_boundaries(world, sweep))) {
+  std::vector<double> etas;
+  for (const Medium& medium : world.media) etas.push_back(double{medium.eta()});
+  const auto [families, of_picture] = choose_families(sweep);
+  for (const MaterialFamily& family : families) {
+    const StageTimer timer(report, "read_cache");
+    if (sweep.medium < etas.size()) etas[sweep.medium] = double{eta_range(family).least};
+    caches_.push_back(cache.relit(etas));
+  }
+  const StageTimer timer(report, "diffusion");
+  for (std::size_t m = 0; m < world.media.size(); ++m) {
     Filling& filling = media_.emplace_back();
     if (m != sweep.medium) {
-      filling.families.emplace_back(world, m, MaterialFamily{{media[m]}}, group, params);
-      filling.of_picture.resize(pictures_, {0, 0});
+      filling.families.emplace_back(std::span(boundaries_->worlds).first(1), m,
+                                    MaterialFamily{{world.media[m]}}, &caches_[0].groups[m], params);
+      filling.of_picture.resize(sweep.wanted.size(), {0, 0});
       continue;
     }
-    const auto [families, of_picture] = choose_families(sweep);
-    for (const MaterialFamily& family : families)
-      filling.families.emplace_back(world, m, family, group, params);
+    for (std::size_t f = 0; f < families.size(); ++f)
+      filling.families.emplace_back(boundaries_->worlds, m, families[f], &caches_[f].groups[m], params,
+                                    [&](double eta) { return cache.irradiance(m, eta); });
     filling.of_picture = of_picture;
   }
 }
@@ -147,11 +187,11 @@ Image Renderer::render(const RenderParams& params, Progress& progress, Report& r
 
 std::vector<Image> Renderer::render_sweep(const RenderParams& params, Progress& progress, Report& report,
                                           Warnings& warnings) const {
-  std::vector<PixelBuffer> pictures(pictures_,
+  std::vector<PixelBuffer> pictures(boundaries_->of_picture.size(),
                                     PixelBuffer(params.crop_width, params.crop_height, params.aovs));
-  Totals totals(world_.scene->media.size());
+  Totals totals(world().scene->media.size());
   const Stopwatch watch;
-  const PixelLoop loop(world_, media_, params);
+  const PixelLoop loop(*boundaries_, media_, params);
   const std::size_t pixel_count =
       static_cast<std::size_t>(params.crop_width) * static_cast<std::size_t>(params.crop_height);
   const std::vector<Tile> tiles = make_tiles(params);
@@ -177,13 +217,13 @@ std::vector<Image> Renderer::render_sweep(const RenderParams& params, Progress& 
   report.counts["rays"] += totals.rays;
   report.counts["shading_points"] += totals.shading_points;
   report.counts["kernel_evaluations"] += totals.evaluations;
-  for (std::size_t m = 0; m < world_.scene->media.size(); ++m) {
+  for (std::size_t m = 0; m < world().scene->media.size(); ++m) {
     std::vector<std::string> paths;
     for (const Translucency& family : media_[m].families) paths.push_back(family.describe_path());
-    report.notes["diffusion of " + medium_label(*world_.scene, m)] =
+    report.notes["diffusion of " + medium_label(*world().scene, m)] =
         fmt::format("{}", fmt::join(paths, "; "));
   }
-  for (std::string& warning : describe_lost_samples(*world_.scene, totals))
+  for (std::string& warning : describe_lost_samples(*world().scene, totals))
     warnings.push_back(std::move(warning));
   std::vector<Image> images;
   images.reserve(pictures.size());
@@ -192,7 +232,7 @@ std::vector<Image> Renderer::render_sweep(const RenderParams& params, Progress& 
 }
 
 Verification Renderer::verify(const RenderParams& params, int count) const {
-  const PixelLoop loop(world_, media_, params);
+  const PixelLoop loop(*boundaries_, media_, params);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(params.crop_width) * static_cast<std::uint64_t>(params.crop_height);
   const auto wanted = static_cast<std::size_t>(count);
@@ -201,14 +241,15 @@ Verification Renderer::verify(const RenderParams& params, int count) const {
   for (std::uint64_t i = 0; hits.size() < wanted && i < most; ++i) {
     const std::uint64_t pixel = hash_words(params.seed, 0x766572, i) % pixels;
     const Hit hit = loop.first_hit(static_cast<std::uint32_t>(pixel));
-    if (!hit || world_.shape(hit).medium == kNone) continue;
-    if (!world_.scene->media[static_cast<std::size_t>(world_.shape(hit).medium)].lambert) hits.push_back(hit);
+    if (!hit || world().shape(hit).medium == kNone) continue;
+    if (!world().scene->media[static_cast<std::size_t>(world().shape(hit).medium)].lambert)
+      hits.push_back(hit);
   }
   if (hits.empty()) return {};
   std::vector<Rgb> values(hits.size()), exact(hits.size());
   parallel_for(hits.size(), 8, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      media_[static_cast<std::size_t>(world_.shape(hits[i]).medium)].families[0].eval_exitance(
+      media_[static_cast<std::size_t>(world().shape(hits[i]).medium)].families[0].eval_exitance(
           std::span(hits).subspan(i, 1), std::span(values).subspan(i, 1), std::span(exact).subspan(i, 1));
   });
   const auto as_image = [](const std::vector<Rgb>& radiances) {

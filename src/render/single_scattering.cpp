@@ -127,21 +127,23 @@ struct SingleScattering::Impl {
 };
 
 SingleScattering::SingleScattering(const World& world, std::size_t medium, const MaterialFamily& family) {
-  const Medium& first = family.media[0];
-  Impl impl{world, Interior(world, medium), {}, {}, first.eta(), first.convention == Convention::kConserving};
-  const auto sigma_t = [](const Medium& m) { return (m.sigma_s + m.sigma_a) * m.scale; };
+  const float eta = world.media[medium].eta();
+  Impl impl{
+      world, Interior(world, medium), {}, {}, eta, family.media[0].convention == Convention::kConserving};
+  std::vector<std::uint32_t> own;
   for (const std::uint32_t index : family.wanted) {
     const Medium& m = family.media[index];
-    impl.materials.push_back({m.sigma_s * m.scale, sigma_t(m), m.g});
+    if (m.eta() != eta) continue;
+    own.push_back(index);
+    impl.materials.push_back({m.sigma_s * m.scale, (m.sigma_s + m.sigma_a) * m.scale, m.g});
   }
   for (const std::vector<std::uint32_t>& alike : group_by_extinction(family.media)) {
     Impl::Group group;
     std::vector<Medium> members;
     for (const std::uint32_t index : alike) {
       members.push_back(family.media[index]);
-      const auto wanted = std::ranges::find(family.wanted, index);
-      if (wanted != family.wanted.end())
-        group.members.push_back(static_cast<std::uint32_t>(wanted - family.wanted.begin()));
+      const auto wanted = std::ranges::find(own, index);
+      if (wanted != own.end()) group.members.push_back(static_cast<std::uint32_t>(wanted - own.begin()));
     }
     const auto [thinnest, densest] = find_extinctions(members);
     for (int k = 0; k < 3; ++k)

@@ -16,23 +16,24 @@ enum Purpose : std::uint64_t { kMonteCarloPoints = 11, kLambertLight, kSinglePoi
 
 }  // namespace
 
-Translucency::Translucency(const World& world, std::size_t medium, const MaterialFamily& family,
-                           const CacheGroup* group, const RenderParams& params)
-    : world_(world),
+Translucency::Translucency(std::span<const World> boundaries, std::size_t medium,
+                           const MaterialFamily& family, const CacheGroup* group, const RenderParams& params,
+                           const IrradianceForEta& irradiance)
+    : world_(boundaries[0]),
       medium_(medium),
       method_(family.media[0].lambert ? Method::kLambert : params.method),
       eta_(family.media[0].eta()),
-      bounces_(irradiance_bounces(*world.scene, medium, params.bounces)),
-      light_samples_(world.scene->integrator.emitter_samples),
+      bounces_(irradiance_bounces(*boundaries[0].scene, medium, params.bounces)),
+      light_samples_(boundaries[0].scene->integrator.emitter_samples),
       single_samples_(params.single_samples),
       mc_samples_(params.mc_samples),
       tolerance_(params.tolerance),
       certified_(params.certified),
       group_(group) {
   if (uses_cache(method_)) {
-    exitance_ =
-        std::make_unique<const Exitance>(*group, family, method_ == Method::kExact ? 0 : params.tolerance,
-                                         params.certified ? Promise::kCertified : Promise::kCalibrated);
+    exitance_ = std::make_unique<const Exitance>(
+        *group, family, method_ == Method::kExact ? 0 : params.tolerance,
+        params.certified ? Promise::kCertified : Promise::kCalibrated, irradiance);
     // Interpolation has no bound.
     if (method_ == Method::kHierarchical && params.tolerance > 0 && !params.certified)
       make_field(family, *group, params.tolerance);
@@ -45,12 +46,22 @@ Translucency::Translucency(const World& world, std::size_t medium, const Materia
     for (int k = 0; k < 3; ++k)
       material.total[k] = static_cast<float>(profiles[static_cast<std::size_t>(k)].total);
     if (method_ == Method::kMonteCarlo)
-      material.monte_carlo.emplace(world, medium, m, params.mc_sampling, bounces_);
+      material.monte_carlo.emplace(world_, medium, m, params.mc_sampling, bounces_);
   }
   // An opaque surface has no inside, and normalized diffusion holds all orders of scattering already.
   if (single_samples_ > 0 && method_ != Method::kLambert &&
       family.media[0].profile != ProfileKind::kNormalized)
-    single_.emplace(world, medium, family);
+    make_singles(boundaries, family);
+}
+
+void Translucency::make_singles(std::span<const World> boundaries, const MaterialFamily& family) {
+  for (std::size_t b = 0; b < boundaries.size(); ++b) {
+    std::vector<std::size_t> materials;
+    for (std::size_t m = 0; m < materials_.size(); ++m)
+      if (materials_[m].medium.eta() == boundaries[b].media[medium_].eta()) materials.push_back(m);
+    if (!materials.empty())
+      singles_.push_back({b, SingleScattering(boundaries[b], medium_, family), std::move(materials)});
+  }
 }
 
 // Where samples are further apart than a mean free path, M_o has detail at every sample; and where a body has
@@ -170,12 +181,17 @@ Rgb Translucency::lambert_irradiance(const ExitPoint& point) const {
                              point.sample * static_cast<std::uint32_t>(light_samples_));
 }
 
-void Translucency::estimate_single_scattering(const ExitPoint& point, LostSamples& lost,
+void Translucency::estimate_single_scattering(std::size_t boundary, const ExitPoint& point, LostSamples& lost,
                                               std::span<Rgb> radiance) const {
-  single_->estimate(point.surface, point.out, single_samples_, hash_words(point.key, kSinglePoints),
-                    point.sample * static_cast<std::uint32_t>(single_samples_), lost, radiance);
-  const Rgb albedo = surface_albedo(world_, point.hit, false);
-  for (Rgb& value : radiance) value *= albedo;
+  for (const Single& single : singles_) {
+    if (single.boundary != boundary) continue;
+    std::vector<Rgb> scattered(single.materials.size());
+    single.scattering.estimate(point.surface, point.out, single_samples_,
+                               hash_words(point.key, kSinglePoints),
+                               point.sample * static_cast<std::uint32_t>(single_samples_), lost, scattered);
+    const Rgb albedo = surface_albedo(world_, point.hit, false);
+    for (std::size_t i = 0; i < scattered.size(); ++i) radiance[single.materials[i]] = scattered[i] * albedo;
+  }
 }
 
 }  // namespace nacre

@@ -33,10 +33,14 @@ struct BakedLight {
 
 class Translucency {
  public:
-  /// A medium of the scene filled with what is wanted of a family, which has the eta of the scene's. `group`
-  /// is read where the method needs it, else it may be nullptr.
+  /// A medium of the scene filled with what is wanted of a family. `boundaries` are the world with each eta
+  /// that these have in that medium. `group`, for the family's least eta, is read where the method needs it,
+  /// else it may be nullptr; `irradiance` where there are several.
+  Translucency(std::span<const World> boundaries, std::size_t medium, const MaterialFamily& family,
+               const CacheGroup* group, const RenderParams& params, const IrradianceForEta& irradiance = {});
   Translucency(const World& world, std::size_t medium, const MaterialFamily& family, const CacheGroup* group,
-               const RenderParams& params);
+               const RenderParams& params)
+      : Translucency(std::span(&world, 1), medium, family, group, params) {}
   std::size_t material_count() const { return materials_.size(); }
 
   /// Diffuse exitance M_o at points that should lie near each other, all materials of a point side by side;
@@ -64,9 +68,10 @@ class Translucency {
   void eval_exitance(std::span<const Hit> hits, std::span<Rgb> exitance, std::span<Rgb> exact) const;
   /// What the cache's nearest sample has received; nothing without a cache.
   BakedLight nearest_light(const SurfacePoint& point) const noexcept;
-  bool has_single_scattering() const { return single_.has_value(); }
-  /// For each material.
-  void estimate_single_scattering(const ExitPoint& point, LostSamples& lost, std::span<Rgb> radiance) const;
+  bool has_single_scattering() const { return !singles_.empty(); }
+  /// For each material that has the eta of that boundary; others are left alone.
+  void estimate_single_scattering(std::size_t boundary, const ExitPoint& point, LostSamples& lost,
+                                  std::span<Rgb> radiance) const;
 
  private:
   struct Material {
@@ -75,6 +80,13 @@ class Translucency {
     Rgb total;  // of the profile
     std::optional<MonteCarloDiffusion> monte_carlo;
   };
+  // Of what is wanted those of one eta.
+  struct Single {
+    std::size_t boundary;
+    SingleScattering scattering;
+    std::vector<std::size_t> materials;
+  };
+  void make_singles(std::span<const World> boundaries, const MaterialFamily& family);
   void make_field(const MaterialFamily& family, const CacheGroup& group, double tolerance);
   KeyValues make_key() const;
   Rgb lambert_irradiance(const ExitPoint& point) const;
@@ -90,7 +102,7 @@ class Translucency {
   const CacheGroup* group_;
   std::unique_ptr<const Exitance> exitance_;
   std::unique_ptr<const ExitanceField> field_;
-  std::optional<SingleScattering> single_;
+  std::vector<Single> singles_;
   mutable KeyValues key_;  // of what is kept, once it was asked for: all samples are hashed
 };
 

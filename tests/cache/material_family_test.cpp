@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "cache/sample_sets.h"
+#include "nacre/base/error.h"
 #include "nacre/cache/exitance.h"
+#include "nacre/optics/eta_change.h"
 
 namespace nacre {
 namespace {
@@ -74,6 +76,60 @@ TEST_P(EveryKind, EachMemberIsWithinTheTolerance) {
           }
       }
     }
+}
+
+// Light at all angles, of which each member lets in its own share.
+TEST_P(EveryKind, MembersOfSeveralIndicesAreWithinTheTolerance) {
+  const auto light = [](double eta) {
+    return [shares = entering_shares(eta)](const Vec3& p, const Vec3& n) {
+      const double share = shares[static_cast<std::size_t>(2.5f * (p.y + 0.999f))];
+      return side_light(p, n) * static_cast<float>(share);
+    };
+  };
+  std::vector<Medium> plan = make_plan(GetParam(), 10);
+  for (std::size_t m = 0; m < plan.size(); ++m) {
+    plan[m].ext_ior = 1;
+    plan[m].int_ior = 1.2f + 0.05f * static_cast<float>(m * 5 % 12);
+  }
+  const MaterialFamilies sorted = sort_materials(plan, true);
+  ASSERT_EQ(sorted.families.size(), 1u);
+  EXPECT_GT(sort_materials(plan).families.size(), 1u);
+  MaterialFamily family = sorted.families[0];
+  for (std::uint32_t m = 0; m < plan.size(); ++m) family.wanted.push_back(m);
+  std::vector<Vec3> points;
+  Rng rng(31);
+  for (int i = 0; i < 60; ++i) points.push_back(on_sphere(rng));
+  points.emplace_back(1e4f, 0, 0);
+  const OwnedGroup least = make_group(make_sphere(48, light(double{eta_range(family).least})));
+  const IrradianceForEta irradiance = [&](double eta) {
+    std::array<std::vector<float>, 3> planes;
+    const auto of_eta = light(eta);
+    for (std::size_t i = 0; i < least.group.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        planes[k].push_back(of_eta(least.group.position(i), least.group.normal(i))[static_cast<int>(k)]);
+    return planes;
+  };
+  for (const double tolerance : {0.1, 0.01, 0.001}) {
+    const Exitance exitance(least.group, family, tolerance, Promise::kCalibrated, irradiance);
+    std::vector<Rgb> values(points.size() * plan.size()), expected(points.size());
+    std::uint64_t evaluations = 0;
+    exitance.eval(points, values, evaluations);
+    for (std::size_t m = 0; m < plan.size(); ++m) {
+      const Medium& medium = family.media[m];
+      const OwnedGroup own = make_group(make_sphere(48, light(double{medium.eta()})));
+      Exitance(own.group, medium, 0).eval(points, expected, evaluations);
+      for (int k = 0; k < 3; ++k) {
+        double error = 0, norm = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          error += square(double{values[i * plan.size() + m][k]} - double{expected[i][k]});
+          norm += square(double{expected[i][k]});
+        }
+        EXPECT_LE(std::sqrt(error), tolerance * std::sqrt(norm)) << tolerance << " " << m << " " << k;
+      }
+    }
+  }
+  EXPECT_THROW(Exitance(least.group, family, 0, Promise::kCalibrated, irradiance), Error);
+  EXPECT_THROW(Exitance(least.group, family, 0.01, Promise::kCertified, irradiance), Error);
 }
 
 // Whichever are wanted, and as the only member the same as without a family.

@@ -93,6 +93,22 @@ TEST_F(Sweep, ManyMaterialsAreEachWithinTheTolerance) {
   }
 }
 
+// Of one family, with an irradiance and reflections each.
+TEST_F(Sweep, IndicesOfRefractionAreEachWithinTheTolerance) {
+  run("sweep s.xml --cache c.nacre -o d --quiet --vary eta=1.2:1.6:12 --report report.json");
+  const nlohmann::json report = nlohmann::json::parse(bytes("report.json"));
+  EXPECT_EQ(report["notes"].size(), 1u) << report;
+  EXPECT_EQ(report["counts"]["pixels"], 48 * 36) << "pictures share their rays";
+  for (const int index : {0, 5, 11}) {
+    run(fmt::format("render s.xml --cache c.nacre -o r.exr --quiet --method exact -D eta={:.7g}",
+                    1.2 + 0.4 * index / 11));
+    const std::string picture = fmt::format("d/{:04}.exr r.exr", index + 1);
+    run("diff " + picture + " --layer diffusion --fail-above 0.01");
+    for (const char* layer : {"single", "specular", "surface"})
+      run("diff " + picture + " --fail-above 0.001 --layer " + layer);
+  }
+}
+
 // Under another g with the same sigma_s' light is scattered after quite other distances.
 TEST_F(Sweep, SingleScatteringIsNoNoisierThanAlone) {
   run("sweep s.xml --cache c.nacre -o d --quiet --spp 4 --vary 'g=0;0.9'");

@@ -212,7 +212,7 @@ TEST(LightChoice, DensitiesServeMultipleImportanceSampling) {
       const Vec3 direction = sample_cosine_hemisphere(sobol_2d(0, hash_words(r, 2)));
       const Hit hit = world.tracer.intersect({x, direction});
       const std::size_t light =
-          hit ? static_cast<std::size_t>(world.shape(hit).light) : world.lights.environment;
+          hit ? static_cast<std::size_t>(world.shape(hit).light) : world.lights->environment;
       const float radiance = !hit              ? environment_radiance(world, direction).x
                              : direction.z > 0 ? std::get<AreaLight>(scene.lights[light].model).radiance.x
                                                : 0;

@@ -23,8 +23,8 @@ struct MaterialFamily {
 inline constexpr std::size_t kFewMaterials = 8;
 
 /// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
-/// eta unless they may be mixed, whether it is an opaque surface, and a mean free path to three octaves: up to
-/// there it costs less to refine once, for the strictest, than to do so for several families.
+/// eta unless they may be mixed, whether it is an opaque surface, and a mean free path to three octaves: up
+/// to there it costs less to refine once, for the strictest, than to do so for several families.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
   std::vector<std::string> digests;  // of each, see family_digest
@@ -53,8 +53,9 @@ EtaRange eta_range(const MaterialFamily& family);
 /// By channel, the least and the largest extinction coefficient sigma_t of the members, per scene unit.
 std::array<Rgb, 2> find_extinctions(std::span<const Medium> media);
 
-/// The members, by index, in groups of one eta in which no channel's extinction coefficient differs by more than half an
-/// octave from that of the group's first: distances that light goes before it scatters serve all of them.
+/// The members, by index, in groups of one eta in which no channel's extinction coefficient differs by more
+/// than half an octave from that of the group's first: distances that light goes before it scatters serve all
+/// of them.
 std::vector<std::vector<std::uint32_t>> group_by_extinction(std::span<const Medium> media);
 
 /// True if a fifth of the light or more is absorbed at a scattering, in some channel: M_o falls faster then.

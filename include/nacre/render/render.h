@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 #include "nacre/base/report.h"
 #include "nacre/cache/cache.h"
 #include "nacre/cache/material_family.h"
+#include "nacre/cache/relight.h"
 #include "nacre/render/image_file.h"
 #include "nacre/render/monte_carlo.h"
 #include "nacre/transport/world.h"
@@ -53,6 +55,7 @@ struct RenderParams {
 RenderParams default_render_params(const Scene& scene, std::size_t camera);
 
 struct Filling;
+struct Boundaries;
 
 /// Errors of the hierarchical diffusion against the sum over every sample, by the definitions that `nacre
 /// diff` uses for images: the worst channel counts, the largest is over points brighter than 1e-4 of the
@@ -71,6 +74,13 @@ struct MaterialSweep {
   std::vector<std::uint32_t> wanted;  // indices into MaterialFamilies::places
 };
 
+/// Whether materials of several indices of refraction are summed up together (sort_materials). What they
+/// have in common is bounded for none of them, and each has an irradiance of its own to show.
+inline bool mixes_eta(const RenderParams& params) {
+  return params.method == Method::kHierarchical && params.tolerance > 0 && !params.certified &&
+         !params.aovs.irradiance && !params.aovs.irradiance_error;
+}
+
 /// What all pictures of a scene with one set of materials share: diffusion that was evaluated for one is
 /// there for the next.
 class Renderer {
@@ -78,8 +88,9 @@ class Renderer {
   /// `cache` holds a group for each medium of the scene where the method uses one; world and cache have to
   /// outlive it. Of `params` it takes the method, its tolerance, samples and bounces; pictures have the same.
   Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report);
-  /// The same for several materials in one of the scene's media, of its eta.
-  Renderer(const World& world, const Cache& cache, const RenderParams& params, Report& report,
+  /// The same for several materials in one of the scene's media, whose indices of refraction the cache has to
+  /// serve. World and cache are copied, the scene has to outlive it.
+  Renderer(const World& world, const ScaledCache& cache, const RenderParams& params, Report& report,
            const MaterialSweep& sweep);
   ~Renderer();
 
@@ -111,8 +122,10 @@ class Renderer {
   Verification verify(const RenderParams& params, int count) const;
 
  private:
-  const World& world_;
-  std::size_t pictures_;
+  const World& world() const;
+
+  std::unique_ptr<const Boundaries> boundaries_;
+  std::vector<Cache> caches_;   // for the least eta of each family
   std::vector<Filling> media_;  // parallel to Scene::media
 };
 

@@ -20,8 +20,8 @@ struct LostSamples {
 /// cos(theta_i')), so that radiance is conserved at the entry.
 class SingleScattering {
  public:
-  /// Of a medium of the scene filled with what is wanted of a family, whose eta is the scene's. The world has
-  /// to outlive it.
+  /// Of a medium of the world filled with those of a family that are wanted and have its eta, in the order in
+  /// which they are wanted. The world has to outlive it.
   SingleScattering(const World& world, std::size_t medium, const MaterialFamily& family);
   SingleScattering(const World& world, std::size_t medium, const Medium& material)
       : SingleScattering(world, medium, MaterialFamily{{material}}) {}

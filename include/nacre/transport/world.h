@@ -16,7 +16,7 @@ namespace nacre {
 /// unchanged.
 struct World {
   const Scene* scene;
-  RayTracer tracer;         // mesh i is Scene::shapes[i]
+  RayTracer tracer;           // mesh i is Scene::shapes[i]
   std::vector<Bsdf> bsdfs;    // parallel to Scene::shapes
   std::vector<Medium> media;  // parallel to Scene::media: those, or what fills them instead
   std::shared_ptr<const LightTable> lights;
