@@ -20,6 +20,12 @@ constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 // as kCalibration, as long as its radius is at most this share of its distance.
 constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
 
+// In the dark all of a sum is far away: nothing is added up sample by sample, and a few nodes towards the
+// light are most of it, so that errors cancel less. From this darkness on less is allowed, down to two
+// fifths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no longer
+// cancels either.
+constexpr double kDim = 3, kDark = 4, kDarkest = 6, kDarkening = 0.5;
+
 // Largest cells that take over the guess of the cell around them.
 constexpr int kInheritLevel = 1;
 
@@ -36,7 +42,8 @@ struct Exitance::Target {
   LocalExpansion far;    // of what is far from all of it
   SetExpansion set_far;  // the same for each material of a family
   Totals total;          // about what the sum is, by guide
-  IndexList pending;     // octree nodes that its parts deal with
+  double darkness;
+  IndexList pending;  // octree nodes that its parts deal with
 };
 
 struct Exitance::Room {
@@ -96,10 +103,24 @@ Exitance::Totals Exitance::weigh(const Target& target, Room& room) const {
   return totals;
 }
 
+// How many times darker than the mean of the surface it is there, as a logarithm, in the darkest channel.
+double Exitance::find_darkness(const Totals& totals) const {
+  if (promise_ == Promise::kCertified) return 0;
+  double least = 1;
+  for (std::size_t g = 0; g < guides_.size(); ++g)
+    for (int k = 0; k < 3; ++k)
+      if (const Rgb& lit = guides_[g].lit; lit[k] > 0)
+        least = std::min(least, double{totals[g][k]} / double{lit[k]});
+  return -std::log(std::max(least, 1e-30));
+}
+
 // What nodes may err by at every distance, the least of all guides.
 void Exitance::make_limits(const Target& target, Room& room) const {
-  const double classes =
-      std::ceil(kRadiiPerOctave * std::log2(double{target.radius} / (kSmallestRadius * cell_size_)));
+  const double allowed = 1 / (1 + kDarkening * std::clamp(target.darkness - kDim, 0.0, kDarkest - kDim));
+  // Series err by the cube of the radius: a share of what is allowed is that of a larger target.
+  const double radius_scale = 1 / std::cbrt(allowed);
+  const double classes = std::ceil(
+      kRadiiPerOctave * std::log2(radius_scale * double{target.radius} / (kSmallestRadius * cell_size_)));
   const auto data = [](const std::array<std::vector<float>, 3>& channels) {
     return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
   };
@@ -117,8 +138,17 @@ void Exitance::make_limits(const Target& target, Room& room) const {
         {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(guide.per_third)},
         share, lean_.size(), g > 0, room.limits.data());
   }
+  if (allowed < 1)
+    for (Limits& limit : room.limits) {
+      limit.as_point *= static_cast<float>(allowed);
+      limit.in_series *= static_cast<float>(allowed);
+    }
   // All that is nearer than the bins reach.
   room.limits[0].as_point = room.limits[0].in_series = -1;
+}
+
+KernelTables Exitance::tables_for(const Target& target) const noexcept {
+  return target.darkness > kDark ? kernels_[0].exact_tables() : kernels_[0].tables();
 }
 
 void Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
@@ -128,7 +158,7 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   if (!set_) {
     const Float4 far = target.far.eval(x - target.centre);
     std::array<double, 3> sum{double{far[0]}, double{far[1]}, double{far[2]}};
-    lanes::add_sources(kernels_[0].tables(), room.list, x, sum);
+    lanes::add_sources(tables_for(target), room.list, x, sum);
     for (std::size_t k = 0; k < 3; ++k)
       (*values)[static_cast<int>(k)] = static_cast<float>(std::max(sum[k], 0.0));
     return;
@@ -185,7 +215,9 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       level == 0 || (room.whole ? level <= kWholeLevel && work <= kPointsPerCell : level <= kLeafLevel);
 
   // The sum hardly changes within a cell of a few samples.
-  target.total = room.whole && level <= kInheritLevel ? parent->total : weigh(target, room);
+  const bool inherits = room.whole && level <= kInheritLevel;
+  target.total = inherits ? parent->total : weigh(target, room);
+  target.darkness = inherits ? parent->darkness : find_darkness(target.total);
   make_limits(target, room);
 
   const bool certified = promise_ == Promise::kCertified;
@@ -240,8 +272,9 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
     lanes::add_series(*set_, nodes_.data(), node_powers(), far, target.centre, target.set_far);
     lanes::add_series(*set_, sources_.data(), source_powers(), far_samples, target.centre, target.set_far);
   } else {
-    lanes::add_series(kernels_[0].tables(), nodes_.data(), far, target.centre, target.far);
-    lanes::add_series(kernels_[0].tables(), sources_.data(), far_samples, target.centre, target.far);
+    const KernelTables tables = tables_for(target);
+    lanes::add_series(tables, nodes_.data(), far, target.centre, target.far);
+    lanes::add_series(tables, sources_.data(), far_samples, target.centre, target.far);
   }
   room.evaluations += kernel_count_ * (nodes.far.size() + nodes.far_samples.size());
 
@@ -321,7 +354,7 @@ void Exitance::sum_exactly(std::span<const Vec3> points, std::span<Rgb> exitance
     for (std::size_t i = begin; i < std::min(begin + kChunk, group_.size()); ++i) list.add(make_source(i));
     list.pad();
     for (std::size_t i = 0; i < exitance.size(); ++i)
-      lanes::add_sources(kernels_[i % material_count_].tables(), list, points[i / material_count_],
+      lanes::add_sources(kernels_[i % material_count_].exact_tables(), list, points[i / material_count_],
                          totals[i]);
   }
   for (std::size_t i = 0; i < exitance.size(); ++i)

@@ -71,8 +71,8 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
   if (!(spacing_ > 0)) spacing_ = cell_size_;
   if (promise == Promise::kCalibrated) {
     const double most = kCalibration * std::pow(tolerance / 0.001, kGrowth);
-    allowance_ *=
-        std::clamp(most * std::sqrt(lit_pieces(length) / kManyPieces), std::min(kAlone, most), most);
+    piece_share_ = std::clamp(std::sqrt(lit_pieces(length) / kManyPieces), std::min(kAlone / most, 1.0), 1.0);
+    allowance_ *= most * piece_share_;
   }
   cells_per_unit_ = 1 / cell_size_;
   for (int axis = 0; axis < 3; ++axis)
@@ -149,8 +149,10 @@ void Exitance::make_kernels(const MaterialFamily& family) {
     }
     for (std::size_t k = 0; k < 3; ++k)
       if (const Profile profile = make_profiles(in_units(family.media[choice[k]], unit_))[k];
-          profile.total > 0)
+          profile.total > 0) {
         fastest = std::max(fastest, profile.decay());
+        guide.lit[static_cast<int>(k)] = static_cast<float>(profile.total);
+      }
   }
   // If light is absorbed rather than scattered R_d falls within a mean free path, and in the dark the sum is
   // a few nodes, whose errors do not cancel. Hardly any less where it falls within one or more, a tenth at
@@ -234,6 +236,9 @@ void Exitance::make_tables(Guide& guide, std::size_t count) {
   const auto edge2 = [&](std::size_t bin) {
     return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
   };
+  const double area = double{unit_} * double{unit_} * group_.surface_area;
+  for (int k = 0; k < 3; ++k)
+    guide.lit[k] *= area > 0 ? static_cast<float>(double{root.power[k]} / area) : 0.0f;
   for (auto& channel : guide.per_third) channel.assign(padded, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const Kernel::Bounds& bounds = kernel.bounds(edge2(i));

@@ -129,19 +129,23 @@ void Kernel::make_jets(const std::array<Profile, 3>& profiles, std::uint32_t fir
   jets_[count] = {broadcast(0), broadcast(0), broadcast(0), broadcast(0)};
 }
 
-KernelTables Kernel::tables() const noexcept {
+KernelTables Kernel::exact_tables() const noexcept {
   static_assert(sizeof(Cell) == 8 * sizeof(float) && sizeof(JetCell) == 16 * sizeof(float));
   const auto bins = [](std::uint32_t first, std::size_t count, int shift) {
     return DistanceBins{static_cast<std::int32_t>(first), static_cast<std::int32_t>(first + count - 1),
                         shift};
   };
-  const bool interpolated = cell_middles_.empty();
-  return {interpolated ? reinterpret_cast<const float*>(cells_.data())
-                       : reinterpret_cast<const float*>(cell_middles_.data()),
-          interpolated ? reinterpret_cast<const float*>(jets_.data())
-                       : reinterpret_cast<const float*>(jet_middles_.data()),
-          interpolated, bins(first_cell_, cells_.size(), 23 - kCellBits),
-          bins(first_jet_, jets_.size(), 23 - kJetBits)};
+  return {reinterpret_cast<const float*>(cells_.data()), reinterpret_cast<const float*>(jets_.data()), true,
+          bins(first_cell_, cells_.size(), 23 - kCellBits), bins(first_jet_, jets_.size(), 23 - kJetBits)};
+}
+
+KernelTables Kernel::tables() const noexcept {
+  KernelTables tables = exact_tables();
+  if (cell_middles_.empty()) return tables;
+  tables.cells = reinterpret_cast<const float*>(cell_middles_.data());
+  tables.jets = reinterpret_cast<const float*>(jet_middles_.data());
+  tables.interpolated = false;
+  return tables;
 }
 
 void Kernel::make_middles() {

@@ -76,6 +76,8 @@ void Translucency::make_field(const MaterialFamily& family, const CacheGroup& gr
   if (group.size() == 0) return;
   constexpr double kNodesPerRadius = 3, kAbsorbing = 0.75;
   const bool absorbing = std::ranges::any_of(family.media, &absorbs_much);
+  // Light on few pieces has detail at each, which fewer others hide.
+  tolerance *= std::sqrt(exitance_->piece_share());
   const double distance =
       std::min(ExitanceField::node_distance(tolerance) * length * (absorbing ? kAbsorbing : 1),
                double{group.nodes[0].radius} / kNodesPerRadius);

@@ -62,6 +62,9 @@ class Exitance {
   Exitance(const Exitance&) = delete;
   Exitance& operator=(const Exitance&) = delete;
   std::size_t material_count() const noexcept { return material_count_; }
+  /// Where light falls on few pieces of a mean free path, errors cancel less: the share of what is allowed
+  /// otherwise, 1 where there are many.
+  double piece_share() const noexcept { return piece_share_; }
 
   /// Diffuse exitance M_o = sum R_d(|x - p|) E_t(p) A_p at points in scene units, with all materials of a
   /// point side by side. Space is divided into blocks, those into cells, down to a few distances of samples.
@@ -106,6 +109,7 @@ class Exitance {
   // A kernel that errors are held against, among the extreme ones of the family, and its tables.
   struct Guide {
     std::size_t kernel;                           // its index
+    Rgb lit{0, 0, 0};                             // M_o under the mean irradiance
     std::vector<Radius> radii;                    // from the smallest cell on, kRadiiPerOctave each
     std::array<std::vector<float>, 3> per_third;  // what a share of the sum allows, by channel
   };
@@ -147,6 +151,8 @@ class Exitance {
                    bool whole) const;
   void place(Target& target, std::span<const Point> range, int level, const Room& room) const;
   Totals weigh(const Target& target, Room& room) const;
+  double find_darkness(const Totals& totals) const;
+  KernelTables tables_for(const Target& target) const noexcept;
   void make_limits(const Target& target, Room& room) const;
   void eval_outside(const Point& point, Room& room) const;
   void eval_point(const Target& target, const Point& point, Room& room) const;
@@ -172,6 +178,7 @@ class Exitance {
   std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;
+  double piece_share_ = 1;
   double own_share_ = 1;        // of it, what a node's own contribution allows
   float moment_slack_ = 1e-5f;  // what rounding and tables may take from second moments
   Vec3d origin_{0, 0, 0};       // corner of the first cell

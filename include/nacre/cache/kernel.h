@@ -44,8 +44,10 @@ class Kernel {
   double relative_error(float distance) const noexcept;
   /// The same of the derivatives in `eval_jet`.
   double relative_error_of_jets(float distance) const noexcept;
-  /// With linear interpolation; or without, where `middles` were made: then R errs by up to 0.3 % and its
-  /// derivatives by up to 3 %, each way alike, which sums of many terms hardly show.
+  /// With linear interpolation.
+  KernelTables exact_tables() const noexcept;
+  /// Without, where `middles` were made: then R errs by up to 0.3 % and its derivatives by up to 3 %, each
+  /// way alike, which sums of many terms hardly show; far more where R falls like an exponential.
   KernelTables tables() const noexcept;
   void make_middles();
 
