@@ -24,7 +24,7 @@ constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
 // light are most of it, so that errors cancel less. From this darkness on less is allowed, down to two
 // fifths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no longer
 // cancels either.
-constexpr double kDim = 3, kDark = 4, kDarkest = 6, kDarkening = 0.5;
+constexpr double kDim = 1.5, kDark = 4, kDarkest = 6, kDarkening = 0.5;
 
 // Largest cells that take over the guess of the cell around them.
 constexpr int kInheritLevel = 1;
