@@ -198,11 +198,12 @@ TEST(Lambert, IsTheTotalWhereTheLightComesIn) {
   const Vec3 in = Vec3(0.5f, 0.2f, 0.8f).normalized();
   add_directional_light(scene, -in, {1, 2, 3});
   add_camera(scene, {0, 0, 1000}, 1, 2);
-  const World world = make_world(scene, true);
+  World world = make_world(scene, true);
   const auto profiles = make_profiles(medium);
   const double eta = static_cast<double>(medium.eta());
   for (const Convention convention : {Convention::kPublished, Convention::kConserving}) {
     scene.media[0].convention = convention;
+    refresh(world);
     // By the medium's own wish, which needs no cache either.
     const Image image = render_with(world, {}, default_render_params(scene, 0));
     const double through = (1 - fresnel_reflectance(static_cast<double>(in.z), eta)) *
