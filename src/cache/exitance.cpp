@@ -21,8 +21,8 @@ constexpr float kGuessRatio = 0.7f, kBoundRatio = 0.2f;
 constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
 
 // In the dark all of a sum is far away: nothing is added up sample by sample, and a few nodes towards the
-// light are most of it, so that errors cancel less. From this darkness on less is allowed, down to two
-// fifths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no longer
+// light are most of it, so that errors cancel less. From this darkness on less is allowed, down to
+// three tenths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no longer
 // cancels either.
 constexpr double kDim = 1.5, kDark = 4, kDarkest = 6, kDarkening = 0.5;
 
