@@ -22,8 +22,8 @@ constexpr float kMomentWeight = 0.1f, kRatio = 0.35f;
 
 // In the dark all of a sum is far away: nothing is added up sample by sample, and a few nodes towards the
 // light are most of it, so that errors cancel less. From this darkness on less is allowed, down to
-// three tenths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no longer
-// cancels either.
+// three tenths. From the second on tables are interpolated: what R_d falls by within a cell of theirs no
+// longer cancels either.
 constexpr double kDim = 1.5, kDark = 4, kDarkest = 6, kDarkening = 0.5;
 
 // Largest cells that take over the guess of the cell around them.
