@@ -34,6 +34,7 @@ HWY_INLINE Quads load_quads(const At& at) {
   return *at(0);
 }
 HWY_INLINE Quads load_row(const Float4* from) { return *from; }
+HWY_INLINE Quads spread_quads(const float* from) { return broadcast(*from); }
 template <int kLane>
 HWY_INLINE Quads spread(Quads a) {
   return broadcast(a[kLane]);
@@ -48,19 +49,28 @@ HWY_INLINE Float4 sum(Quads a) { return a; }
 using Quads = VF;
 constexpr std::size_t kQuads = hn::MaxLanes(F()) / 4;
 static_assert(kQuads == 1 || kQuads == 2 || kQuads == 4);
-template <class At>
-HWY_INLINE Quads load_quads(const At& at) {
-  const hn::FixedTag<float, 4> d4;
-  const auto load = [&](std::size_t i)
-                        HWY_ATTR { return hn::LoadU(d4, reinterpret_cast<const float*>(at(i))); };
+using Quad = hn::FixedTag<float, 4>;
+// `get(i)` is the i-th of them.
+template <class Get>
+HWY_INLINE Quads join_quads(const Get& get) {
   if constexpr (kQuads == 1) {
-    return load(0);
+    return get(0);
   } else if constexpr (kQuads == 2) {
-    return hn::Combine(F(), load(1), load(0));
+    return hn::Combine(F(), get(1), get(0));
   } else {
     const hn::Half<F> half;
-    return hn::Combine(F(), hn::Combine(half, load(3), load(2)), hn::Combine(half, load(1), load(0)));
+    return hn::Combine(F(), hn::Combine(half, get(3), get(2)), hn::Combine(half, get(1), get(0)));
   }
+}
+template <class At>
+HWY_INLINE Quads load_quads(const At& at) {
+  return join_quads([&](std::size_t i)
+                        HWY_ATTR { return hn::LoadU(Quad(), reinterpret_cast<const float*>(at(i))); });
+}
+// Neighbouring floats, each in all lanes of its own: made in registers, as a vector that is read from where
+// parts of it were just written waits for them.
+HWY_INLINE Quads spread_quads(const float* from) {
+  return join_quads([&](std::size_t i) HWY_ATTR { return hn::Set(Quad(), from[i]); });
 }
 HWY_INLINE Quads load_row(const Float4* from) { return hn::LoadU(F(), reinterpret_cast<const float*>(from)); }
 // One lane of each in all of its lanes.

@@ -29,10 +29,8 @@ struct Rows : RunRows<kInterpolated, kRun> {
     constexpr int kStep = kInterpolated ? 2 : 1;
     const auto at = [&](std::size_t k) HWY_ATTR { return table + kStep * (kFields * row[i + k] + field); };
     if constexpr (kInterpolated) {
-      HWY_ALIGN Float4 fractions[kQuads];
-      for (std::size_t k = 0; k < kQuads; ++k) fractions[k] = broadcast(fraction[i + k]);
-      return mul_add(load_row(fractions), load_quads([&](std::size_t k) HWY_ATTR { return at(k) + 1; }),
-                     load_quads(at));
+      return mul_add(spread_quads(fraction + i),
+                     load_quads([&](std::size_t k) HWY_ATTR { return at(k) + 1; }), load_quads(at));
     } else {
       return load_quads(at);
     }
