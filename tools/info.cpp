@@ -51,8 +51,7 @@ bool show_mesh(const std::string& path) {
 }
 
 void show_density(const CacheGroup& group, double mm_per_unit) {
-  const double spacing =
-      hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * mm_per_unit;
+  const double spacing = hexagonal_spacing(group) * mm_per_unit;
   fmt::print("  spacing {:.4g} mm: serves mean free paths down to {:.3g} mm\n", spacing,
              spacing / spacing_for_blotch(kAcceptableBlotch));
 }

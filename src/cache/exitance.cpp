@@ -167,19 +167,19 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   target.set_far.eval(x - target.centre, room.far);
   room.totals.assign(room.far.begin(), room.far.end());
   lanes::add_sources(*set_, room.list, source_powers(), x, room.totals);
-  for (int k = 0; k < 3; ++k) {
-    const double* const totals = room.totals.data() + static_cast<std::size_t>(k) * set_->padded();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t first = set_->first(k), last = set_->first(k + 1);
+    const auto channel = static_cast<int>(k);
     if (weights_.empty()) {
       for (std::size_t m = 0; m < material_count_; ++m)
-        values[m][k] = static_cast<float>(std::max(totals[m], 0.0));
+        values[m][channel] = static_cast<float>(std::max(room.totals[first + m], 0.0));
       continue;
     }
     room.combined.assign(material_count_, 0.0f);
-    const float* weights = weights_.data() + static_cast<std::size_t>(k) * kernel_count_ * material_count_;
-    for (std::size_t j = 0; j < kernel_count_; ++j, weights += material_count_)
+    for (std::size_t lane = first; lane < last; ++lane)
       for (std::size_t m = 0; m < material_count_; ++m)
-        room.combined[m] += weights[m] * static_cast<float>(totals[j]);
-    for (std::size_t m = 0; m < material_count_; ++m) values[m][k] = std::max(room.combined[m], 0.0f);
+        room.combined[m] += weights_[lane * material_count_ + m] * static_cast<float>(room.totals[lane]);
+    for (std::size_t m = 0; m < material_count_; ++m) values[m][channel] = std::max(room.combined[m], 0.0f);
   }
 }
 

@@ -227,14 +227,15 @@ void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_e
     std::fill(powers_.data() + begin * set_width_, powers_.data() + end * set_width_, 0.0f);
   });
   std::map<double, std::vector<std::size_t>> lanes_of;  // by index
-  for (std::size_t j = 0; j < kernel_etas_.size(); ++j)
-    for (std::size_t k = 0; k < 3; ++k) lanes_of[kernel_etas_[j][k]].push_back(k * set_->padded() + j);
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t lane = set_->first(k); lane < set_->first(k + 1); ++lane)
+      lanes_of[kernel_etas_[lane - set_->first(k)][k]].push_back(lane);
   for (const auto& [eta, lanes] : lanes_of) {
     const std::vector<Float4> powers = source_powers(origins, eta, irradiance);
     parallel_for(powers.size(), kRun, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         for (const std::size_t lane : lanes)
-          powers_[i * set_width_ + lane] = powers[i][lane / set_->padded()];
+          powers_[i * set_width_ + lane] = powers[i][set_->channels()[lane]];
     });
   }
   for (std::uint32_t i = 0; i < source_count_; ++i) sources_[i].power = with_row(sources_[i].power, i);

@@ -53,7 +53,7 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
                    const IrradianceForEta& irradiance)
     : group_(group),
       unit_(std::ldexp(1.0f, -std::clamp(std::ilogb(shortest_length(family.media)), -100, 100))),
-      spacing_(double{unit_} * hexagonal_spacing(group.surface_area, static_cast<double>(group.size()))),
+      spacing_(double{unit_} * hexagonal_spacing(group)),
       material_count_(family.wanted.size()),
       promise_(promise),
       allowance_(tolerance) {
@@ -172,11 +172,11 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
   kernel_count_ = material_count_;
   std::optional<KernelSpan> span;
   std::vector<Response> responses;
-  if (promise_ == Promise::kCalibrated) {
+  if (promise_ == Promise::kCalibrated && family.media.size() > kFewMaterials) {
     for (const Medium& medium : family.media)
       responses.push_back({resolved_profiles(in_units(medium, unit_), spacing_),
                            mixed ? entering_shares(double{medium.eta()}) : std::vector<double>{}});
-    span = find_span(responses, farthest, kSpanShare * tolerance, KernelSet::kLanes);
+    span = find_span(responses, farthest, kSpanShare * tolerance);
   }
   if (!span) {
     set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
@@ -191,9 +191,9 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
     if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
     add_eta(choice);
   }
-  set_ = std::make_unique<const KernelSet>(kernels);
+  set_ = std::make_unique<const KernelSet>(kernels, span->counts);
   for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t j = 0; j < kernel_count_; ++j)
+    for (std::size_t j = 0; j < span->counts[k]; ++j)
       for (const std::uint32_t material : family.wanted) weights_.push_back(span->weights[material][j][k]);
 }
 

@@ -4,41 +4,42 @@
 #include <algorithm>
 
 namespace nacre {
-namespace {
 
-struct Table {
+struct KernelSet::Table {
   const float* rows;
   DistanceBins bins;
 };
 
 // `fields` Float4 a row, of tables that begin and end elsewhere: beyond its ends a table is as it is there.
-std::vector<float> interleave(std::span<const Table> tables, std::size_t fields, std::size_t padded,
-                              DistanceBins& bins) {
+std::vector<float> KernelSet::interleave(std::span<const Table> tables, std::size_t fields,
+                                         DistanceBins& bins) const {
   bins = tables[0].bins;
   for (const Table& table : tables) {
     bins.first = std::min(bins.first, table.bins.first);
     bins.last = std::max(bins.last, table.bins.last);
   }
   const auto count = static_cast<std::size_t>(bins.last - bins.first) + 1;
-  std::vector<float> result(count * fields * 3 * padded);
-  for (std::size_t m = 0; m < tables.size(); ++m) {
-    const Table& table = tables[m];
-    float* to = result.data() + m;
-    for (std::int32_t bin = bins.first; bin <= bins.last; ++bin) {
-      const auto row =
-          static_cast<std::size_t>(std::clamp(bin, table.bins.first, table.bins.last) - table.bins.first);
-      for (std::size_t f = 0; f < fields; ++f)
-        for (std::size_t k = 0; k < 3; ++k, to += padded) *to = table.rows[(row * fields + f) * 4 + k];
+  std::vector<float> result(count * fields * width());
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t lane = first(k); lane < first(k + 1); ++lane) {
+      const Table& table = tables[lane - first(k)];
+      float* to = result.data() + lane;
+      for (std::int32_t bin = bins.first; bin <= bins.last; ++bin) {
+        const auto row =
+            static_cast<std::size_t>(std::clamp(bin, table.bins.first, table.bins.last) - table.bins.first);
+        for (std::size_t f = 0; f < fields; ++f, to += width()) *to = table.rows[(row * fields + f) * 4 + k];
+      }
     }
-  }
   return result;
 }
 
-}  // namespace
-
-KernelSet::KernelSet(std::span<const Kernel> kernels)
-    : padded_((kernels.size() + kLanes - 1) / kLanes * kLanes),
+KernelSet::KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts)
+    : first_{0, counts[0], counts[0] + counts[1], counts[0] + counts[1] + counts[2]},
       interpolated_(kernels[0].tables().interpolated) {
+  channels_.assign((first_[3] + kStep - 1) / kStep * kStep, 3);
+  for (std::size_t k = 0; k < 3; ++k)
+    std::fill(channels_.begin() + static_cast<std::ptrdiff_t>(first_[k]),
+              channels_.begin() + static_cast<std::ptrdiff_t>(first_[k + 1]), static_cast<std::uint32_t>(k));
   std::vector<Table> cells, jets;
   for (const Kernel& kernel : kernels) {
     const KernelTables tables = kernel.tables();
@@ -46,8 +47,8 @@ KernelSet::KernelSet(std::span<const Kernel> kernels)
     jets.push_back({tables.jets, tables.jet_bins});
   }
   const std::size_t parts = interpolated_ ? 2 : 1;
-  cells_ = interleave(cells, parts, padded_, cell_bins_);
-  jets_ = interleave(jets, 2 * parts, padded_, jet_bins_);
+  cells_ = interleave(cells, parts, cell_bins_);
+  jets_ = interleave(jets, 2 * parts, jet_bins_);
 }
 
 void SetExpansion::move_from(const SetExpansion& other, const Vec3& by) {

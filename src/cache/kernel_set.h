@@ -1,6 +1,7 @@
 // The kernels of several materials side by side.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <span>
@@ -12,27 +13,36 @@
 
 namespace nacre {
 
-/// Tables of a KernelTables' layout, in which each field holds `width` floats instead of four: those of the
-/// first channel for all kernels, padded to `padded`, then the second's and the third's. A row reads the same
-/// for a kernel, whichever others there are.
+/// Tables of a KernelTables' layout, in which each field holds `width` floats instead of four: a lane for
+/// each channel of each kernel, those of the first channel before the others', padded to whole steps. A row
+/// reads the same for a lane, whichever others there are.
 class KernelSet {
  public:
-  /// All interpolated or none. No fewer than one.
-  explicit KernelSet(std::span<const Kernel> kernels);
+  /// The first `counts[k]` kernels take part in channel k. All are interpolated or none; no fewer than one.
+  KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts);
+  explicit KernelSet(std::span<const Kernel> kernels)
+      : KernelSet(kernels, {kernels.size(), kernels.size(), kernels.size()}) {}
 
-  std::size_t padded() const noexcept { return padded_; }
-  std::size_t width() const noexcept { return 3 * padded_; }
+  std::size_t width() const noexcept { return channels_.size(); }
+  /// The lanes of a channel are `first(k)` up to `first(k + 1)`.
+  std::size_t first(std::size_t channel) const noexcept { return first_[channel]; }
+  /// Of each lane.
+  const std::uint32_t* channels() const noexcept { return channels_.data(); }
   bool interpolated() const noexcept { return interpolated_; }
   const float* cells() const noexcept { return cells_.data(); }
   const float* jets() const noexcept { return jets_.data(); }
   const DistanceBins& cell_bins() const noexcept { return cell_bins_; }
   const DistanceBins& jet_bins() const noexcept { return jet_bins_; }
 
-  /// Lanes that are processed together, of which `padded` is a multiple.
-  static constexpr std::size_t kLanes = kFewMaterials;
+  /// Floats that `width` is a multiple of; vectors are of as many or twice as many, where there are any.
+  static constexpr std::size_t kStep = 8;
 
  private:
-  std::size_t padded_;
+  struct Table;
+  std::vector<float> interleave(std::span<const Table> tables, std::size_t fields, DistanceBins& bins) const;
+
+  std::array<std::size_t, 4> first_;
+  std::vector<std::uint32_t> channels_;  // 3 where it is padded
   bool interpolated_;
   std::vector<float> cells_, jets_;
   DistanceBins cell_bins_{}, jet_bins_{};
@@ -66,7 +76,8 @@ inline Float4 with_row(Float4 power, std::uint32_t row) noexcept {
 namespace lanes {
 
 /// As for a single kernel; `totals` has `width` sums. Where kernels have a light each, `powers` are rows of
-/// `width` floats, one for each node or source, and in lists that of power_row; else nullptr.
+/// `width` floats, one for each node or source, and in lists that of power_row; else nullptr, and the fourth
+/// channel of all powers has to be 0.
 void add_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
                  std::span<double> totals);
 void add_series(const KernelSet& set, const SumNode* nodes, const float* powers,

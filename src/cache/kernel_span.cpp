@@ -14,7 +14,6 @@ namespace {
 constexpr double kRowsPerOctave = 16;
 constexpr double kNearest = 1.0 / 16;  // of the narrowest width: nearer, profiles are flat
 constexpr double kNegligible = 1e-7;
-constexpr std::size_t kMost = 32;   // in a basis
 constexpr double kRounding = 3e-7;  // relative, of a sum in single precision
 
 // One channel of all materials.
@@ -52,18 +51,20 @@ class ChannelSpan {
     });
   }
 
-  // Adds to the basis until it is good enough, or larger than `most`.
-  void find_basis(double error, std::size_t most) {
+  // Adds to the basis until it is good enough; false if that takes all members.
+  bool find_basis(double error) {
     weights_.assign(members_.size(), Eigen::VectorXd());
     std::vector<double> errors(members_.size(), 1);
-    while (basis_.size() <= most) {
+    while (basis_.size() < std::min(members_.size(), kMostInSpan + 1)) {
       const auto worst = std::ranges::max_element(errors);
-      if (worst == errors.end() || *worst <= error) return;
+      if (*worst <= error) return true;
       basis_.push_back(worst - errors.begin());
       parallel_for(members_.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) errors[i] = fit(i);
       });
     }
+    take_all();
+    return members_.empty();
   }
 
   std::size_t size() const { return basis_.size(); }
@@ -75,6 +76,14 @@ class ChannelSpan {
   }
 
  private:
+  void take_all() {
+    basis_.clear();
+    for (Eigen::Index i = 0; i < std::ssize(members_); ++i) {
+      basis_.push_back(i);
+      weights_[static_cast<std::size_t>(i)] = Eigen::VectorXd::Unit(std::ssize(members_), i);
+    }
+  }
+
   // The weights that come nearest to a member; returns their largest error.
   double fit(std::size_t i) {
     const auto column = static_cast<Eigen::Index>(i);
@@ -98,20 +107,17 @@ class ChannelSpan {
 
 }  // namespace
 
-std::optional<KernelSpan> find_span(std::span<const Response> responses, double farthest, double error,
-                                    std::size_t step) {
-  if (responses.size() <= step) return std::nullopt;
-  const std::size_t most = std::min((responses.size() - 1) / step * step, kMost);
+std::optional<KernelSpan> find_span(std::span<const Response> responses, double farthest, double error) {
   std::vector<ChannelSpan> channels;
-  std::size_t size = 1;
+  KernelSpan span;
+  bool are_fewer = false;
   for (std::size_t k = 0; k < 3; ++k) {
     ChannelSpan& channel = channels.emplace_back(responses, k, farthest);
-    channel.find_basis(error, most);
-    size = std::max(size, channel.size());
-    if (size > most) return std::nullopt;
+    are_fewer |= channel.find_basis(error);
+    span.counts[k] = channel.size();
   }
-  size = (size + step - 1) / step * step;
-  KernelSpan span;
+  const std::size_t size = std::ranges::max(span.counts);
+  if (!are_fewer || size == 0) return std::nullopt;
   span.basis.assign(size, ChannelChoice{});
   span.weights.assign(responses.size(), std::vector<std::array<float, 3>>(size, {0, 0, 0}));
   for (std::size_t k = 0; k < 3; ++k) {

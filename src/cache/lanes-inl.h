@@ -167,14 +167,6 @@ HWY_INLINE FourFields load_fields(const Struct* structs, const std::uint32_t* in
           hn::BitCast(df, hn::InterleaveUpper(pairs, cd01, cd23))};
 #endif
 }
-// One.
-template <class Struct>
-HWY_INLINE VF gather(const Struct* structs, hn::Vec<U> index, int field) {
-  const I di;
-  return hn::GatherIndex(F(), reinterpret_cast<const float*>(structs) + field,
-                         hn::Mul(hn::BitCast(di, index),
-                                 hn::Set(di, static_cast<std::int32_t>(sizeof(Struct) / sizeof(float)))));
-}
 // The fields of a SumNode, float by float.
 enum NodeField {
   kNodeX,
@@ -252,6 +244,13 @@ HWY_INLINE std::size_t store_lanes(hn::Vec<D> values, hn::Mask<F> mask, D d, hn:
   const auto indices = hn::IndicesFromVec(d, hn::And(lane, hn::Set(du, 7)));
   hn::StoreU(hn::TableLookupLanes(values, indices), d, to);
   return static_cast<std::size_t>(std::popcount(bits[0]));
+}
+#elif HWY_TARGET <= HWY_AVX3
+// In a register: to memory the instruction takes some CPUs a hundred cycles.
+template <class D>
+HWY_INLINE std::size_t store_lanes(hn::Vec<D> values, hn::Mask<F> mask, D d, hn::TFromD<D>* to) {
+  hn::StoreU(hn::Compress(values, hn::RebindMask(d, mask)), d, to);
+  return hn::CountTrue(F(), mask);
 }
 #else
 template <class D>

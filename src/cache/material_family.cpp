@@ -53,13 +53,18 @@ double shortest_length(std::span<const Medium> media) {
   return length;
 }
 
+bool is_sparse(const Medium& medium, double spacing) { return spacing > length_of(medium); }
+
 bool absorbs_much(const Medium& medium) { return min_channel(reduce(medium).alpha_prime) < kAbsorbing; }
 
-MaterialFamilies sort_materials(std::span<const Medium> media, bool mixes_eta) {
-  std::map<decltype(family_key(media[0], mixes_eta)), std::size_t> keys;
+MaterialFamilies sort_materials(std::span<const Medium> media, double spacing, bool mixes_eta) {
+  const auto key_of = [&](const Medium& medium) {
+    return std::pair(family_key(medium, mixes_eta), is_sparse(medium, spacing));
+  };
+  std::map<decltype(key_of(media[0])), std::size_t> keys;
   std::vector<Indices> groups;
   for (std::size_t i = 0; i < media.size(); ++i) {
-    const std::size_t at = keys.try_emplace(family_key(media[i], mixes_eta), groups.size()).first->second;
+    const std::size_t at = keys.try_emplace(key_of(media[i]), groups.size()).first->second;
     if (at == groups.size()) groups.emplace_back();
     groups[at].push_back(i);
   }
@@ -97,6 +102,10 @@ std::vector<ChannelChoice> find_extremes(std::span<const Medium> media) {
   choose([](const Profile& profile) { return profile.width; });
   choose([](const Profile& profile) { return profile.decay(); });
   choose([](const Profile& profile) { return -profile.decay(); });
+  if (media.size() < choices.size()) {
+    choices.clear();
+    for (std::size_t i = 0; i < media.size(); ++i) choices.push_back({i, i, i});
+  }
   return choices;
 }
 

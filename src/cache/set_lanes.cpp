@@ -14,9 +14,17 @@
 HWY_BEFORE_NAMESPACE();
 namespace nacre::lanes::HWY_NAMESPACE {
 
-// Kernels side by side.
-using K = hn::CappedTag<float, KernelSet::kLanes>;
-using VK = hn::Vec<K>;
+// Lanes of a set side by side: as many as a vector holds, half of that where they end before.
+using Wide = hn::CappedTag<float, 2 * KernelSet::kStep>;
+using Narrow = hn::CappedTag<float, KernelSet::kStep>;
+
+// Calls `action` with a tag and the first lane for each vector of a set's lanes.
+template <class Action>
+HWY_INLINE void for_each_vector(const KernelSet& set, const Action& action) {
+  std::size_t lane = 0;
+  for (; lane + hn::Lanes(Wide()) <= set.width(); lane += hn::Lanes(Wide())) action(Wide(), lane);
+  for (; lane < set.width(); lane += hn::Lanes(Narrow())) action(Narrow(), lane);
+}
 
 // What one run of sources finds in a table with `kFields` fields a row.
 template <bool kInterpolated, int kFields, std::size_t kRun>
@@ -29,17 +37,55 @@ struct SetRows : RunRows<kInterpolated, kRun> {
 
   HWY_INLINE SetRows(const float* first, std::size_t size) : table(first), width(size) {}
   // From `lane` on.
-  HWY_INLINE VK operator()(std::size_t i, std::size_t field, std::size_t lane) const {
+  template <class D>
+  HWY_INLINE hn::Vec<D> get(D d, std::size_t i, std::size_t field, std::size_t lane) const {
     const float* const at =
         table + (static_cast<std::size_t>(row[i]) * kFields + field) * kStep * width + lane;
     if constexpr (kInterpolated)
-      return hn::MulAdd(hn::Set(K(), fraction[i]), hn::LoadU(K(), at + width), hn::LoadU(K(), at));
+      return hn::MulAdd(hn::Set(d, fraction[i]), hn::LoadU(d, at + width), hn::LoadU(d, at));
     else
-      return hn::LoadU(K(), at);
+      return hn::LoadU(d, at);
   }
 };
 
-HWY_INLINE void add_to(float* to, VK value) { hn::StoreU(hn::Add(hn::LoadU(K(), to), value), K(), to); }
+// What lanes from `lane` on see of a power: each its channel's, or with kOwnPowers what a row has for it.
+template <bool kOwnPowers, class D>
+struct LanePowers {
+  D d;
+#if HWY_TARGET == HWY_SCALAR
+  std::uint32_t channel;
+#else
+  decltype(hn::SetTableIndices(D(), static_cast<const std::int32_t*>(nullptr))) channels;
+#endif
+  const float* rows;
+  std::size_t width;
+
+  HWY_INLINE LanePowers(D tag, const KernelSet& set, const float* powers, std::size_t lane)
+      : d(tag),
+#if HWY_TARGET == HWY_SCALAR
+        channel(set.channels()[lane]),
+#else
+        channels(hn::SetTableIndices(d, reinterpret_cast<const std::int32_t*>(set.channels() + lane))),
+#endif
+        rows(powers + (kOwnPowers ? lane : 0)),
+        width(set.width()) {
+  }
+  HWY_INLINE hn::Vec<D> get(const Float4& power, std::size_t row) const {
+    if constexpr (kOwnPowers)
+      return hn::LoadU(d, rows + row * width);
+    else
+#if HWY_TARGET == HWY_SCALAR
+      return hn::Set(d, power[static_cast<int>(channel)]);
+#else
+      return hn::TableLookupLanes(hn::LoadDup128(d, reinterpret_cast<const float*>(&power)), channels);
+#endif
+  }
+};
+
+template <class D>
+HWY_INLINE void add_to(D d, float* to, hn::Vec<D> value) {
+  hn::StoreU(hn::Add(hn::LoadU(d, to), value), d, to);
+}
 
 // With kOwnPowers each kernel sees a light of its own.
 template <bool kInterpolated, bool kOwnPowers>
@@ -60,27 +106,23 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const flo
                         hn::Sub(load(SourceList::kZ), cz)));
     }
     const Float4* const power = list.powers() + begin;
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t v = 0; v < set.padded(); v += hn::Lanes(K())) {
-        const std::size_t first = k * set.padded() + v;
-        const auto power_of = [&](std::size_t i) HWY_ATTR {
-          if constexpr (kOwnPowers)
-            return hn::LoadU(K(), powers + power_row(power[i]) * set.width() + first);
-          else
-            return hn::Set(K(), power[i][k]);
-        };
-        VK even = hn::Zero(K()), odd = even;
-        std::size_t i = 0;
-        for (; i + 1 < size; i += 2) {
-          even = hn::MulAdd(power_of(i), rows(i, 0, first), even);
-          odd = hn::MulAdd(power_of(i + 1), rows(i + 1, 0, first), odd);
-        }
-        if (i < size) even = hn::MulAdd(power_of(i), rows(i, 0, first), even);
-        HWY_ALIGN float sums[KernelSet::kLanes];
-        hn::Store(hn::Add(even, odd), K(), sums);
-        for (std::size_t lane = 0; lane < hn::Lanes(K()); ++lane)
-          totals[k * set.padded() + v + lane] += static_cast<double>(sums[lane]);
+    for_each_vector(set, [&](auto d, std::size_t lane) HWY_ATTR {
+      using D = decltype(d);
+      const LanePowers<kOwnPowers, D> seen(d, set, powers, lane);
+      const auto term = [&](std::size_t i, hn::Vec<D> sum) HWY_ATTR {
+        return hn::MulAdd(seen.get(power[i], power_row(power[i])), rows.get(d, i, 0, lane), sum);
+      };
+      hn::Vec<D> even = hn::Zero(d), odd = even;
+      std::size_t i = 0;
+      for (; i + 1 < size; i += 2) {
+        even = term(i, even);
+        odd = term(i + 1, odd);
       }
+      if (i < size) even = term(i, even);
+      HWY_ALIGN float sums[hn::MaxLanes(d)];
+      hn::Store(hn::Add(even, odd), d, sums);
+      for (std::size_t k = 0; k < hn::Lanes(d); ++k) totals[lane + k] += static_cast<double>(sums[k]);
+    });
   }
 }
 
@@ -102,9 +144,8 @@ void add_set_sources(const KernelSet& set, const SourceList& list, const float* 
   });
 }
 
-// What a source is weighted by, apart from kernels: its power, where that is the same for all of them, times
-// its offset's monomials, and with second moments times their trace and twice what they stretch along it.
-enum Weight { kOne, kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kTrace, kStretch, kWeights };
+// Monomials of a source's offset, and of second moments their trace and twice what they stretch along it.
+enum Weight { kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kTrace, kStretch, kWeights };
 
 template <bool kInterpolated, bool kOwnPowers, class Struct>
 HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const float* powers,
@@ -134,68 +175,63 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const f
         hn::Store(stretch, df, stretches + i);
       }
     }
-    for (std::size_t k = 0; k < 3; ++k) {
-      for (std::size_t i = 0; i < size; ++i) {
-        const float power = kOwnPowers ? 1 : structs[indices[i]].power[k], x = offsets[i][0],
-                    y = offsets[i][1], z = offsets[i][2];
-        const float px = power * x, py = power * y, pz = power * z;
-        float* const w = weights[i];
-        w[kOne] = power;
-        w[kX] = px;
-        w[kY] = py;
-        w[kZ] = pz;
-        w[kXX] = px * x;
-        w[kYY] = py * y;
-        w[kZZ] = pz * z;
-        w[kYZ] = py * z;
-        w[kZX] = pz * x;
-        w[kXY] = px * y;
-        w[kTrace] = kMoments ? power * traces[i] : 0;
-        w[kStretch] = kMoments ? power * stretches[i] : 0;
-      }
-      for (std::size_t v = 0; v < set.padded(); v += hn::Lanes(K())) {
-        const std::size_t lane = k * set.padded() + v;
-        // Each sum in a register of its own.
-        const VK none = hn::Zero(K());
-        VK value = none, trace = none, x = none, y = none, z = none, xx = none, yy = none, zz = none,
-           yz = none, zx = none, xy = none;
-        for (std::size_t i = 0; i < size; ++i) {
-          const float* const w = weights[i];
-          const auto weight = [&](Weight which) HWY_ATTR { return hn::Set(K(), w[which]); };
-          VK level = values(i, 0, lane), radial = jets(i, 0, lane), bend = jets(i, 1, lane);
-          if constexpr (kOwnPowers) {
-            const VK power = hn::LoadU(K(), powers + indices[i] * width + lane);
-            level = hn::Mul(level, power);
-            radial = hn::Mul(radial, power);
-            bend = hn::Mul(bend, power);
-          }
-          value = hn::MulAdd(weight(kOne), level, value);
-          if constexpr (kMoments)
-            value = hn::MulAdd(weight(kTrace), radial, hn::MulAdd(weight(kStretch), bend, value));
-          trace = hn::MulAdd(weight(kOne), radial, trace);
-          x = hn::MulAdd(weight(kX), radial, x);
-          y = hn::MulAdd(weight(kY), radial, y);
-          z = hn::MulAdd(weight(kZ), radial, z);
-          xx = hn::MulAdd(weight(kXX), bend, xx);
-          yy = hn::MulAdd(weight(kYY), bend, yy);
-          zz = hn::MulAdd(weight(kZZ), bend, zz);
-          yz = hn::MulAdd(weight(kYZ), bend, yz);
-          zx = hn::MulAdd(weight(kZX), bend, zx);
-          xy = hn::MulAdd(weight(kXY), bend, xy);
-        }
-        float* const to = expansion + lane;
-        add_to(to + SetExpansion::kValue * width, value);
-        add_to(to + SetExpansion::kX * width, x);
-        add_to(to + SetExpansion::kY * width, y);
-        add_to(to + SetExpansion::kZ * width, z);
-        add_to(to + SetExpansion::kXX * width, hn::Add(xx, trace));
-        add_to(to + SetExpansion::kYY * width, hn::Add(yy, trace));
-        add_to(to + SetExpansion::kZZ * width, hn::Add(zz, trace));
-        add_to(to + SetExpansion::kYZ * width, yz);
-        add_to(to + SetExpansion::kZX * width, zx);
-        add_to(to + SetExpansion::kXY * width, xy);
-      }
+    for (std::size_t i = 0; i < size; ++i) {
+      const float x = offsets[i][0], y = offsets[i][1], z = offsets[i][2];
+      float* const w = weights[i];
+      w[kX] = x;
+      w[kY] = y;
+      w[kZ] = z;
+      w[kXX] = x * x;
+      w[kYY] = y * y;
+      w[kZZ] = z * z;
+      w[kYZ] = y * z;
+      w[kZX] = z * x;
+      w[kXY] = x * y;
+      w[kTrace] = kMoments ? traces[i] : 0;
+      w[kStretch] = kMoments ? stretches[i] : 0;
     }
+    for_each_vector(set, [&](auto d, std::size_t lane) HWY_ATTR {
+      using D = decltype(d);
+      using V = hn::Vec<D>;
+      const LanePowers<kOwnPowers, D> seen(d, set, powers, lane);
+      // Each sum in a register of its own.
+      const V none = hn::Zero(d);
+      V value = none, trace = none, x = none, y = none, z = none, xx = none, yy = none, zz = none, yz = none,
+        zx = none, xy = none;
+      for (std::size_t i = 0; i < size; ++i) {
+        const float* const w = weights[i];
+        const auto weight = [&](Weight which) HWY_ATTR { return hn::Set(d, w[which]); };
+        const V power = seen.get(structs[indices[i]].power, indices[i]);
+        value = hn::MulAdd(power, values.get(d, i, 0, lane), value);
+        const V radial = hn::Mul(power, jets.get(d, i, 0, lane)),
+                bend = hn::Mul(power, jets.get(d, i, 1, lane));
+        if constexpr (kMoments)
+          value = hn::MulAdd(weight(kTrace), radial, hn::MulAdd(weight(kStretch), bend, value));
+        trace = hn::Add(trace, radial);
+        x = hn::MulAdd(weight(kX), radial, x);
+        y = hn::MulAdd(weight(kY), radial, y);
+        z = hn::MulAdd(weight(kZ), radial, z);
+        xx = hn::MulAdd(weight(kXX), bend, xx);
+        yy = hn::MulAdd(weight(kYY), bend, yy);
+        zz = hn::MulAdd(weight(kZZ), bend, zz);
+        yz = hn::MulAdd(weight(kYZ), bend, yz);
+        zx = hn::MulAdd(weight(kZX), bend, zx);
+        xy = hn::MulAdd(weight(kXY), bend, xy);
+      }
+      float* const to = expansion + lane;
+      const auto add = [&](SetExpansion::Coefficient which, V sum)
+                           HWY_ATTR { add_to(d, to + which * width, sum); };
+      add(SetExpansion::kValue, value);
+      add(SetExpansion::kX, x);
+      add(SetExpansion::kY, y);
+      add(SetExpansion::kZ, z);
+      add(SetExpansion::kXX, hn::Add(xx, trace));
+      add(SetExpansion::kYY, hn::Add(yy, trace));
+      add(SetExpansion::kZZ, hn::Add(zz, trace));
+      add(SetExpansion::kYZ, yz);
+      add(SetExpansion::kZX, zx);
+      add(SetExpansion::kXY, xy);
+    });
   }
 }
 

@@ -30,7 +30,7 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     }
     const auto [x, y, z, radius] = load_fields(test.nodes, batch.indices, kNodeX);
     const auto [spread, lean, first, counts] = load_fields(test.nodes, batch.indices, kNodeSpread);
-    const VF tint = gather(test.nodes, batch.index, kNodeTint);
+    const VF tint = load_fields(test.nodes, batch.indices, kNodeZX).c;
     const VF r2 = length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz));
     // From the point of the target that is nearest to the node.
     const VF to_centre = hn::Sub(hn::Sqrt(r2), hn::Set(df, test.radius));
@@ -49,9 +49,9 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const auto far = hn::And(apart, hn::Le(series_error, in_series));
     const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, as_point)));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
-    const auto rim_bin = hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_rim, to_rim)));
+    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_rim, to_rim))), U(), bins);
     const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Zero(df))),
-                                   hn::Ge(gather(test.limits, rim_bin, kInSeries), hn::Zero(df)));
+                                   hn::Ge(load_fields(test.limits, bins, kLean).d, hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
     const auto opened =
         test.open_small ? near_rest : hn::And(near_rest, hn::Gt(radius, hn::Set(df, test.radius)));
@@ -74,9 +74,10 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     const auto [x, y, z, spare] = load_fields(sources, batch.indices, kSourceX);
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
-    const VI bin = find_cell(test.bins, hn::Mul(to_sample, to_sample));
+    HWY_ALIGN std::uint32_t bins[hn::MaxLanes(df)];
+    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_sample, to_sample))), U(), bins);
     const auto far = hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Zero(df))),
-                             hn::Ge(gather(test.limits, hn::BitCast(U(), bin), kInSeries), hn::Zero(df)));
+                             hn::Ge(load_fields(test.limits, bins, kLean).d, hn::Zero(df)));
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);
     near.reserve(lanes);
     const auto here = hn::AndNot(far, batch.valid);

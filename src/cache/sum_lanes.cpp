@@ -158,6 +158,12 @@ void add_sample_series(const KernelTables& kernel, const SumSource* sources,
     add_structs<false>(kernel, sources, far, centre, expansion);
 }
 
+// A row of a kernel's cells.
+template <bool kInterpolated>
+struct CoarseCell {
+  Float4 fields[kInterpolated ? 2 : 1];
+};
+
 // For a number of kernels that the compiler knows: their sums stay in registers.
 template <bool kInterpolated, std::size_t kCount>
 HWY_INLINE std::uint64_t add_nodes(const KernelTables* kernels, const CoarseTest& test, SortedNodes& lists,
@@ -173,7 +179,7 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables* kernels, const CoarseTest
     const Batch batch = load_batch(lists.work, i);
     const auto [x, y, z, radius] = load_fields(test.nodes, batch.indices, kNodeX);
     const auto [red, green, blue, spare] = load_fields(test.nodes, batch.indices, kNodePower);
-    const VF counts = gather(test.nodes, batch.index, kNodeCounts);
+    const VF counts = load_fields(test.nodes, batch.indices, kNodeSpread).d;
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const auto has_children = hn::RebindMask(
         df, hn::Ne(hn::ShiftRight<SumNode::kChildShift>(hn::BitCast(U(), counts)), hn::Zero(U())));
@@ -189,14 +195,20 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables* kernels, const CoarseTest
                          hn::IfThenElseZero(taken, blue)};
     for (std::size_t g = 0; g < kCount; ++g) {
       const KernelTables& kernel = kernels[g];
-      const VI row = hn::ShiftLeft<2 + kInterpolated>(find_cell(kernel.cell_bins, r2));
-      for (int k = 0; k < 3; ++k) {
-        VF value = hn::GatherIndex(df, kernel.cells + k, row);
-        if constexpr (kInterpolated)
-          value = hn::MulAdd(find_fraction(kernel.cell_bins, r2),
-                             hn::GatherIndex(df, kernel.cells + 4 + k, row), value);
-        sums[g][k] = hn::MulAdd(powers[k], value, sums[g][k]);
+      const auto* const cells = reinterpret_cast<const CoarseCell<kInterpolated>*>(kernel.cells);
+      HWY_ALIGN std::uint32_t rows[hn::MaxLanes(df)];
+      hn::Store(hn::BitCast(U(), find_cell(kernel.cell_bins, r2)), U(), rows);
+      FourFields value = load_fields(cells, rows, 0);
+      if constexpr (kInterpolated) {
+        const FourFields delta = load_fields(cells, rows, 4);
+        const VF fraction = find_fraction(kernel.cell_bins, r2);
+        value.a = hn::MulAdd(fraction, delta.a, value.a);
+        value.b = hn::MulAdd(fraction, delta.b, value.b);
+        value.c = hn::MulAdd(fraction, delta.c, value.c);
       }
+      sums[g][0] = hn::MulAdd(powers[0], value.a, sums[g][0]);
+      sums[g][1] = hn::MulAdd(powers[1], value.b, sums[g][1]);
+      sums[g][2] = hn::MulAdd(powers[2], value.c, sums[g][2]);
     }
   }
   for (std::size_t g = 0; g < kCount; ++g)

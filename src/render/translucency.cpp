@@ -71,16 +71,18 @@ void Translucency::make_field(const MaterialFamily& family, const CacheGroup& gr
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : world_.scene->shapes)
     meshes.push_back(shape.medium == static_cast<int>(medium_) ? &shape.mesh : nullptr);
-  const double length = shortest_length(family.media);
-  if (hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) > length) return;
   if (group.size() == 0) return;
+  const double spacing = hexagonal_spacing(group);
+  if (std::ranges::any_of(family.media, [&](const Medium& m) { return is_sparse(m, spacing); })) return;
   constexpr double kNodesPerRadius = 3, kAbsorbing = 0.75;
-  const bool absorbing = std::ranges::any_of(family.media, &absorbs_much);
+  double detail = std::numeric_limits<double>::infinity();
+  for (const Medium& medium : family.media)
+    detail =
+        std::min(detail, shortest_length(std::span(&medium, 1)) * (absorbs_much(medium) ? kAbsorbing : 1));
   // Light on few pieces has detail at each, which fewer others hide.
   tolerance *= std::sqrt(exitance_->piece_share());
-  const double distance =
-      std::min(ExitanceField::node_distance(tolerance) * length * (absorbing ? kAbsorbing : 1),
-               double{group.nodes[0].radius} / kNodesPerRadius);
+  const double distance = std::min(ExitanceField::node_distance(tolerance) * detail,
+                                   double{group.nodes[0].radius} / kNodesPerRadius);
   if (ExitanceField::predict_nodes(meshes, distance) <= ExitanceField::kMostNodes)
     field_ = std::make_unique<const ExitanceField>(std::move(meshes), *exitance_, distance, tolerance);
 }

@@ -51,7 +51,7 @@ TEST_P(EveryKind, EachMemberIsWithinTheTolerance) {
     for (const float scale : {40.0f, 10.0f, 2.0f}) {
       const OwnedGroup owned = make_group(make_sphere(64, lights[light]));
       const std::vector<Medium> plan = make_plan(GetParam(), scale);
-      const MaterialFamilies sorted = sort_materials(plan);
+      const MaterialFamilies sorted = sort_materials(plan, 0);
       ASSERT_EQ(sorted.families.size(), 1u);
       MaterialFamily family = sorted.families[0];
       for (std::uint32_t m = 0; m < plan.size(); ++m) family.wanted.push_back(m);
@@ -91,9 +91,9 @@ TEST_P(EveryKind, MembersOfSeveralIndicesAreWithinTheTolerance) {
     plan[m].ext_ior = 1;
     plan[m].int_ior = 1.2f + 0.05f * static_cast<float>(m * 5 % 12);
   }
-  const MaterialFamilies sorted = sort_materials(plan, true);
+  const MaterialFamilies sorted = sort_materials(plan, 0, true);
   ASSERT_EQ(sorted.families.size(), 1u);
-  EXPECT_GT(sort_materials(plan).families.size(), 1u);
+  EXPECT_GT(sort_materials(plan, 0).families.size(), 1u);
   MaterialFamily family = sorted.families[0];
   for (std::uint32_t m = 0; m < plan.size(); ++m) family.wanted.push_back(m);
   std::vector<Vec3> points;
@@ -175,12 +175,26 @@ TEST(MaterialFamily, BelongsTogetherWhatIsAlike) {
   });
   add([](Medium& m) { m.scale *= 0.1f; });
   add([](Medium&) {});
-  const MaterialFamilies sorted = sort_materials(plan);
+  const MaterialFamilies sorted = sort_materials(plan, 0);
   EXPECT_EQ(sorted.families.size(), 4u);
   const std::uint32_t family = sorted.places[0].family;
   EXPECT_EQ(sorted.families[family].media.size(), 5u);
   for (const std::size_t i : {1, 2, 5, 7}) EXPECT_EQ(sorted.places[i].family, family) << i;
   EXPECT_TRUE(sorted.families[family].wanted.empty());
+}
+
+// Samples further apart than a mean free path: M_o of those is not interpolated, that of others is.
+TEST(MaterialFamily, IsApartWhereSamplesAreSparse) {
+  std::vector<Medium> plan(4, make_material("Marble", ProfileKind::kDipole, 1));
+  const double length = shortest_length(plan);
+  plan[1].scale = 0.5f;
+  plan[2].scale = 1.5f;
+  EXPECT_EQ(sort_materials(plan, 0.6 * length).families.size(), 1u);
+  const MaterialFamilies sorted = sort_materials(plan, length * 1.1);
+  ASSERT_EQ(sorted.families.size(), 2u);
+  EXPECT_EQ(sorted.places[0].family, sorted.places[3].family);
+  EXPECT_EQ(sorted.places[0].family, sorted.places[2].family);
+  EXPECT_NE(sorted.places[0].family, sorted.places[1].family);
 }
 
 // A mean free path on either side of any fixed boundary.
@@ -192,7 +206,7 @@ TEST(MaterialFamily, ReachesThreeOctavesFromItsShortestMember) {
       plan.push_back(medium);
       plan.back().scale = start * 2.0f / scale;
     }
-    const MaterialFamilies sorted = sort_materials(plan);
+    const MaterialFamilies sorted = sort_materials(plan, 0);
     ASSERT_EQ(sorted.families.size(), 2u) << start;
     EXPECT_EQ(sorted.families[0].media.size(), 3u);
     for (std::size_t i = 0; i < plan.size(); ++i)

@@ -117,5 +117,8 @@ struct Cache {
 
 /// Distance of a hexagonal lattice of the same density: sqrt(2/sqrt(3) * area / count).
 double hexagonal_spacing(double area, double count);
+inline double hexagonal_spacing(const CacheGroup& group) {
+  return hexagonal_spacing(group.surface_area, static_cast<double>(group.size()));
+}
 
 }  // namespace nacre

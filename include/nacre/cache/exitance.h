@@ -168,8 +168,8 @@ class Exitance {
   std::size_t material_count_;
   std::vector<Kernel> kernels_;           // of the materials, then those of guides that are none of them
   std::unique_ptr<const KernelSet> set_;  // where they are of a family: theirs, or what spans them
-  std::vector<float> weights_;  // then, of each kernel of the set in each material: channel, kernel, material
-  std::size_t kernel_count_ = 1;  // that are summed up
+  std::vector<float> weights_;            // of what spans them, by lane of the set and material
+  std::size_t kernel_count_ = 1;          // that are summed up
   // Of families with several indices of refraction: whose light each kernel of the set sees, by channel, and
   // the power of each source, then of each node, for each of them.
   std::vector<std::array<double, 3>> kernel_etas_;

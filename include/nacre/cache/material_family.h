@@ -23,8 +23,9 @@ struct MaterialFamily {
 inline constexpr std::size_t kFewMaterials = 8;
 
 /// The families that `media` fall into, each with all its members and none wanted: alike are a profile, an
-/// eta unless they may be mixed, whether it is an opaque surface, and a mean free path to three octaves: up
-/// to there it costs less to refine once, for the strictest, than to do so for several families.
+/// eta unless they may be mixed, whether it is an opaque surface, whether samples `spacing` apart are sparse
+/// for them, and a mean free path to three octaves: up to there it costs less to refine once, for the
+/// strictest, than to do so for several families.
 struct MaterialFamilies {
   std::vector<MaterialFamily> families;
   std::vector<std::string> digests;  // of each, see family_digest
@@ -33,13 +34,18 @@ struct MaterialFamilies {
   };
   std::vector<Place> places;  // parallel to `media`
 };
-MaterialFamilies sort_materials(std::span<const Medium> media, bool mixes_eta = false);
+MaterialFamilies sort_materials(std::span<const Medium> media, double spacing, bool mixes_eta = false);
 
 /// The smallest mean free path of any channel of the media, in scene units.
 double shortest_length(std::span<const Medium> media);
 
+/// True if samples `spacing` apart are further apart than a mean free path: then M_o has detail at each of
+/// them, and is not interpolated.
+bool is_sparse(const Medium& medium, double spacing);
+
 /// In each channel, the members that are the narrowest, the widest, and that fall fastest and slowest far
-/// away: a choice for each channel, none twice. What lies between them is no stricter.
+/// away: a choice for each channel, none twice. What lies between them is no stricter. All members, where
+/// they are fewer.
 using ChannelChoice = std::array<std::size_t, 3>;
 std::vector<ChannelChoice> find_extremes(std::span<const Medium> media);
 
