@@ -151,6 +151,10 @@ KernelTables Exitance::tables_for(const Target& target) const noexcept {
   return target.darkness > kDark ? kernels_[0].exact_tables() : kernels_[0].tables();
 }
 
+const KernelSet& Exitance::set_for(const Target& target) const noexcept {
+  return dark_set_ && target.darkness > kDark ? *dark_set_ : *set_;
+}
+
 void Exitance::eval_point(const Target& target, const Point& point, Room& room) const {
   const Vec3& x = room.points[point.index];
   Rgb* const values = &room.exitance[point.index * material_count_];
@@ -166,7 +170,7 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   room.far.resize(set_->width());
   target.set_far.eval(x - target.centre, room.far);
   room.totals.assign(room.far.begin(), room.far.end());
-  lanes::add_sources(*set_, room.list, source_powers(), x, room.totals);
+  lanes::add_sources(set_for(target), room.list, source_powers(), x, room.totals);
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t first = set_->first(k), last = set_->first(k + 1);
     const auto channel = static_cast<int>(k);
@@ -191,6 +195,7 @@ void Exitance::eval_outside(const Point& point, Room& room) const {
                        room.evaluations);
   Target& target = room.targets[0];
   target.centre = room.points[point.index];
+  target.darkness = kDarkest;
   target.set_far.clear(set_->width());
   room.list.clear();
   for (std::size_t i = 0; i < source_count_; ++i) room.list.add(sources_[i]);
@@ -269,8 +274,9 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
   if (is_leaf) lanes::sort_samples(test, sources_.data(), nodes, room.list);
   const auto far = nodes.far.span(), far_samples = nodes.far_samples.span();
   if (set_) {
-    lanes::add_series(*set_, nodes_.data(), node_powers(), far, target.centre, target.set_far);
-    lanes::add_series(*set_, sources_.data(), source_powers(), far_samples, target.centre, target.set_far);
+    const KernelSet& set = set_for(target);
+    lanes::add_series(set, nodes_.data(), node_powers(), far, target.centre, target.set_far);
+    lanes::add_series(set, sources_.data(), source_powers(), far_samples, target.centre, target.set_far);
   } else {
     const KernelTables tables = tables_for(target);
     lanes::add_series(tables, nodes_.data(), far, target.centre, target.far);

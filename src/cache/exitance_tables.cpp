@@ -179,7 +179,7 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
     span = find_span(responses, farthest, kSpanShare * tolerance);
   }
   if (!span) {
-    set_ = std::make_unique<const KernelSet>(std::span(kernels_).first(material_count_));
+    add_set(std::span(kernels_).first(material_count_), {material_count_, material_count_, material_count_});
     for (const std::uint32_t material : family.wanted) add_eta({material, material, material});
     return;
   }
@@ -191,10 +191,16 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
     if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
     add_eta(choice);
   }
-  set_ = std::make_unique<const KernelSet>(kernels, span->counts);
+  add_set(kernels, span->counts);
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t j = 0; j < span->counts[k]; ++j)
       for (const std::uint32_t material : family.wanted) weights_.push_back(span->weights[material][j][k]);
+}
+
+void Exitance::add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts) {
+  set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kAny);
+  if (!set_->interpolated())
+    dark_set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kExact);
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their

@@ -33,16 +33,16 @@ std::vector<float> KernelSet::interleave(std::span<const Table> tables, std::siz
   return result;
 }
 
-KernelSet::KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts)
+KernelSet::KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts, Tables which)
     : first_{0, counts[0], counts[0] + counts[1], counts[0] + counts[1] + counts[2]},
-      interpolated_(kernels[0].tables().interpolated) {
+      interpolated_(which == Tables::kExact || kernels[0].tables().interpolated) {
   channels_.assign((first_[3] + kStep - 1) / kStep * kStep, 3);
   for (std::size_t k = 0; k < 3; ++k)
     std::fill(channels_.begin() + static_cast<std::ptrdiff_t>(first_[k]),
               channels_.begin() + static_cast<std::ptrdiff_t>(first_[k + 1]), static_cast<std::uint32_t>(k));
   std::vector<Table> cells, jets;
   for (const Kernel& kernel : kernels) {
-    const KernelTables tables = kernel.tables();
+    const KernelTables tables = which == Tables::kExact ? kernel.exact_tables() : kernel.tables();
     cells.push_back({tables.cells, tables.cell_bins});
     jets.push_back({tables.jets, tables.jet_bins});
   }

@@ -18,10 +18,9 @@ namespace nacre {
 /// reads the same for a lane, whichever others there are.
 class KernelSet {
  public:
+  enum class Tables { kAny, kExact };  // as they are, or interpolated
   /// The first `counts[k]` kernels take part in channel k. All are interpolated or none; no fewer than one.
-  KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts);
-  explicit KernelSet(std::span<const Kernel> kernels)
-      : KernelSet(kernels, {kernels.size(), kernels.size(), kernels.size()}) {}
+  KernelSet(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts, Tables which);
 
   std::size_t width() const noexcept { return channels_.size(); }
   /// The lanes of a channel are `first(k)` up to `first(k + 1)`.

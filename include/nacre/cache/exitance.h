@@ -142,6 +142,7 @@ class Exitance {
   }
   void make_kernels(const MaterialFamily& family);
   void make_set(const MaterialFamily& family, double tolerance, double farthest);
+  void add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts);
   void make_tables();
   void make_tables(Guide& guide, std::size_t count);
   bool in_grid(const Vec3& x) const noexcept;
@@ -153,6 +154,7 @@ class Exitance {
   Totals weigh(const Target& target, Room& room) const;
   double find_darkness(const Totals& totals) const;
   KernelTables tables_for(const Target& target) const noexcept;
+  const KernelSet& set_for(const Target& target) const noexcept;
   void make_limits(const Target& target, Room& room) const;
   void eval_outside(const Point& point, Room& room) const;
   void eval_point(const Target& target, const Point& point, Room& room) const;
@@ -166,10 +168,11 @@ class Exitance {
   LargeArray<SumNode> nodes_;
   double spacing_;  // distance of samples
   std::size_t material_count_;
-  std::vector<Kernel> kernels_;           // of the materials, then those of guides that are none of them
-  std::unique_ptr<const KernelSet> set_;  // where they are of a family: theirs, or what spans them
-  std::vector<float> weights_;            // of what spans them, by lane of the set and material
-  std::size_t kernel_count_ = 1;          // that are summed up
+  std::vector<Kernel> kernels_;  // of the materials, then those of guides that are none of them
+  // Where they are of a family: theirs, or what spans them; and for the dark, where that is not interpolated.
+  std::unique_ptr<const KernelSet> set_, dark_set_;
+  std::vector<float> weights_;    // of what spans them, by lane of the set and material
+  std::size_t kernel_count_ = 1;  // that are summed up
   // Of families with several indices of refraction: whose light each kernel of the set sees, by channel, and
   // the power of each source, then of each node, for each of them.
   std::vector<std::array<double, 3>> kernel_etas_;
