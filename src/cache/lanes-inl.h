@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <type_traits>
 
 #include "cache/sum_lanes.h"
 
@@ -93,6 +94,20 @@ HWY_INLINE Float4 sum(Quads a) {
   return parts[0];
 }
 #endif
+
+// Calls `action` with truths that the compiler knows.
+template <class Action>
+HWY_INLINE void with_truth(bool truth, const Action& action) {
+  if (truth)
+    action(std::true_type());
+  else
+    action(std::false_type());
+}
+template <class Action>
+HWY_INLINE void with_truths(bool a, bool b, const Action& action) {
+  with_truth(a,
+             [&](auto known) HWY_ATTR { with_truth(b, [&](auto other) HWY_ATTR { action(known, other); }); });
+}
 
 // Where a distance lies in a table: the cell, and the fraction of it.
 HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {

@@ -126,20 +126,9 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const flo
   }
 }
 
-// Calls `action` with two compile-time truths.
-template <class Action>
-HWY_INLINE void with_constants(bool a, bool b, const Action& action) {
-  constexpr std::true_type kYes;
-  constexpr std::false_type kNo;
-  if (a)
-    b ? action(kYes, kYes) : action(kYes, kNo);
-  else
-    b ? action(kNo, kYes) : action(kNo, kNo);
-}
-
 void add_set_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
                      std::span<double> totals) {
-  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
     add_list<interpolated.value, own.value>(set, list, powers, x, totals);
   });
 }
@@ -237,13 +226,13 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const f
 
 void add_set_nodes(const KernelSet& set, const SumNode* nodes, const float* powers,
                    std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
-  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
     add_structs<interpolated.value, own.value>(set, nodes, powers, far, centre, expansion);
   });
 }
 void add_set_samples(const KernelSet& set, const SumSource* sources, const float* powers,
                      std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
-  with_constants(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
+  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
     add_structs<interpolated.value, own.value>(set, sources, powers, far, centre, expansion);
   });
 }

@@ -69,10 +69,8 @@ HWY_INLINE void add_list(const KernelTables& kernel, const SourceList& list, con
 
 void add_sources(const KernelTables& kernel, const SourceList& list, const Vec3& x,
                  std::array<double, 3>& total) {
-  if (kernel.interpolated)
-    add_list<true>(kernel, list, x, total);
-  else
-    add_list<false>(kernel, list, x, total);
+  with_truth(kernel.interpolated,
+             [&](auto interpolated) HWY_ATTR { add_list<interpolated.value>(kernel, list, x, total); });
 }
 
 template <bool kInterpolated, class Struct>
@@ -145,17 +143,15 @@ HWY_INLINE void add_structs(const KernelTables& kernel, const Struct* structs,
 
 void add_node_series(const KernelTables& kernel, const SumNode* nodes, std::span<const std::uint32_t> far,
                      const Vec3& centre, LocalExpansion& expansion) {
-  if (kernel.interpolated)
-    add_structs<true>(kernel, nodes, far, centre, expansion);
-  else
-    add_structs<false>(kernel, nodes, far, centre, expansion);
+  with_truth(kernel.interpolated, [&](auto interpolated) HWY_ATTR {
+    add_structs<interpolated.value>(kernel, nodes, far, centre, expansion);
+  });
 }
 void add_sample_series(const KernelTables& kernel, const SumSource* sources,
                        std::span<const std::uint32_t> far, const Vec3& centre, LocalExpansion& expansion) {
-  if (kernel.interpolated)
-    add_structs<true>(kernel, sources, far, centre, expansion);
-  else
-    add_structs<false>(kernel, sources, far, centre, expansion);
+  with_truth(kernel.interpolated, [&](auto interpolated) HWY_ATTR {
+    add_structs<interpolated.value>(kernel, sources, far, centre, expansion);
+  });
 }
 
 // A row of a kernel's cells.

@@ -117,9 +117,16 @@ Renderer::Renderer(const World& world, const ScaledCache& cache, const RenderPar
   std::vector<double> etas;
   for (const Medium& medium : world.media) etas.push_back(double{medium.eta()});
   const auto [families, of_picture] = choose_families(sweep);
+  std::vector<float> least;           // eta, of each cache
+  std::vector<std::size_t> cache_of;  // a family
   for (const MaterialFamily& family : families) {
     const StageTimer timer(report, "read_cache");
-    if (sweep.medium < etas.size()) etas[sweep.medium] = double{eta_range(family).least};
+    const float eta = eta_range(family).least;
+    const auto found = std::ranges::find(least, eta);
+    cache_of.push_back(static_cast<std::size_t>(found - least.begin()));
+    if (found != least.end()) continue;
+    least.push_back(eta);
+    if (sweep.medium < etas.size()) etas[sweep.medium] = double{eta};
     caches_.push_back(cache.relit(etas));
   }
   const StageTimer timer(report, "diffusion");
@@ -132,8 +139,8 @@ Renderer::Renderer(const World& world, const ScaledCache& cache, const RenderPar
       continue;
     }
     for (std::size_t f = 0; f < families.size(); ++f)
-      filling.families.emplace_back(boundaries_->worlds, m, families[f], &caches_[f].groups[m], params,
-                                    [&](double eta) { return cache.irradiance(m, eta); });
+      filling.families.emplace_back(boundaries_->worlds, m, families[f], &caches_[cache_of[f]].groups[m],
+                                    params, [&](double eta) { return cache.irradiance(m, eta); });
     filling.of_picture = of_picture;
   }
 }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "cache/kernel_set.h"
 #include "cache/sample_sets.h"
 #include "nacre/base/simd.h"
 
@@ -135,6 +136,81 @@ TEST_P(EveryTarget, NodesCarryTheirSecondMoments) {
   const double coarse = error_of(1.0f), fine = error_of(0.5f);
   EXPECT_LT(coarse, 0.03);
   EXPECT_LT(fine, coarse / 6);
+}
+
+// Kernels side by side are what they are one by one: of every number around whole vectors, of fewer in one
+// channel than in others, interpolated or not, under one light or one each.
+TEST_P(EveryTarget, SumsSetsAsOneByOne) {
+  const std::vector<SumSource> sources = make_sources(333);
+  std::vector<SumNode> nodes(sources.size());
+  std::vector<std::uint32_t> all;
+  SourceList list, rows;
+  for (std::uint32_t i = 0; i < sources.size(); ++i) {
+    const SumSource& s = sources[i];
+    nodes[i] = SumNode{};
+    nodes[i].x = s.x, nodes[i].y = s.y, nodes[i].z = s.z;
+    nodes[i].xx = 0.01f, nodes[i].yy = 0.02f, nodes[i].zz = 0.03f, nodes[i].xy = 0.005f;
+    nodes[i].power = s.power;
+    all.push_back(i);
+    list.add(s);
+    rows.add({s.x, s.y, s.z, 0, with_row(s.power, i)});
+  }
+  list.pad();
+  rows.pad();
+  const Vec3 centre(2.2f, 1.9f, -1.4f);
+  for (const bool middles : {false, true})
+    for (const std::size_t count : {1u, 2u, 5u, 6u, 11u}) {
+      std::vector<Kernel> kernels;
+      for (std::size_t i = 0; i < count; ++i) {
+        const float scale = 0.5f + 0.25f * static_cast<float>(i);
+        kernels.emplace_back(make_profiles(make_material("Skin1", ProfileKind::kDipole, scale)));
+        if (middles) kernels.back().make_middles();
+      }
+      const std::array<std::size_t, 3> counts{count, count - count / 2, count};
+      const KernelSet set(kernels, counts, KernelSet::Tables::kAny);
+      ASSERT_EQ(set.width() % KernelSet::kStep, 0u);
+      ASSERT_EQ(set.first(3), counts[0] + counts[1] + counts[2]);
+      // Each lane sees its channel's light times 1 + its number.
+      std::vector<float> own(sources.size() * set.width());
+      for (std::size_t i = 0; i < sources.size(); ++i)
+        for (std::size_t lane = 0; lane < set.first(3); ++lane)
+          own[i * set.width() + lane] =
+              static_cast<float>(lane + 1) * sources[i].power[static_cast<int>(set.channels()[lane])];
+      for (const bool has_own : {false, true}) {
+        const float* const powers = has_own ? own.data() : nullptr;
+        std::vector<double> totals(set.width());
+        lanes::add_sources(set, has_own ? rows : list, powers, centre, totals);
+        SetExpansion of_nodes, of_sources;
+        of_nodes.clear(set.width());
+        of_sources.clear(set.width());
+        lanes::add_series(set, nodes.data(), powers, all, centre, of_nodes);
+        lanes::add_series(set, sources.data(), powers, all, centre, of_sources);
+        const Vec3 at(0.1f, -0.2f, 0.15f);
+        std::vector<float> node_values(set.width()), source_values(set.width());
+        of_nodes.eval(at, node_values);
+        of_sources.eval(at, source_values);
+        for (std::size_t j = 0; j < count; ++j) {
+          std::array<double, 3> total{};
+          LocalExpansion single_nodes, single_sources;
+          lanes::add_sources(kernels[j].tables(), list, centre, total);
+          lanes::add_series(kernels[j].tables(), nodes.data(), all, centre, single_nodes);
+          lanes::add_series(kernels[j].tables(), sources.data(), all, centre, single_sources);
+          for (std::size_t k = 0; k < 3; ++k) {
+            if (j >= counts[k]) continue;
+            const std::size_t lane = set.first(k) + j;
+            const double light = has_own ? static_cast<double>(lane + 1) : 1;
+            const auto channel = static_cast<int>(k);
+            EXPECT_NEAR(totals[lane] / (light * total[k]), 1, 1e-5) << count << " " << lane;
+            EXPECT_NEAR(double{node_values[lane]} / (light * double{single_nodes.eval(at)[channel]}), 1, 1e-5)
+                << count << " " << lane;
+            EXPECT_NEAR(double{source_values[lane]} / (light * double{single_sources.eval(at)[channel]}), 1,
+                        1e-5)
+                << count << " " << lane;
+          }
+        }
+        for (std::size_t lane = set.first(3); lane < set.width(); ++lane) EXPECT_EQ(totals[lane], 0);
+      }
+    }
 }
 
 // Whatever the instructions, a value depends on the same nodes; what is left is rounding.
