@@ -182,20 +182,24 @@ void ExitanceField::judge(Part& part) const noexcept {
                                    std::memory_order_release);
 }
 
-bool ExitanceField::is_steep(const Patch& patch) const noexcept {
-  const auto exceeds = [](Float4 x, Float4 most) {
-    return x[0] > most[0] || x[1] > most[1] || x[2] > most[2] || x[3] > most[3];
-  };
+ExitanceField::Lanes ExitanceField::steep_lanes(const Patch& patch, std::size_t quad) const noexcept {
+  Lanes steep{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const Float4 *const from = values(patch.nodes[i]), *const to = values(patch.nodes[(i + 1) % 3]);
-    const Float4* const between = patch.nodes[3 + i] != kNone ? values(patch.nodes[3 + i]) : nullptr;
-    for (std::size_t q = 0; q < quads_; ++q) {
-      const Float4 a = from[q], b = to[q], mean = (a + b) * broadcast(0.5f);
-      if (exceeds(magnitude(a - b), mean * broadcast(most_change_))) return true;
-      if (!between) continue;
-      const Float4 middle = between[q];
-      if (exceeds(magnitude(middle - mean), larger(mean, middle) * broadcast(most_bend_))) return true;
-    }
+    const Float4 a = values(patch.nodes[i])[quad], b = values(patch.nodes[(i + 1) % 3])[quad];
+    const Float4 mean = (a + b) * broadcast(0.5f);
+    steep |= magnitude(a - b) > mean * broadcast(most_change_);
+    if (patch.nodes[3 + i] == kNone) continue;
+    const Float4 middle = values(patch.nodes[3 + i])[quad];
+    steep |= magnitude(middle - mean) > larger(mean, middle) * broadcast(most_bend_);
+  }
+  return steep;
+}
+
+// For any of the materials.
+bool ExitanceField::is_steep(const Patch& patch) const noexcept {
+  for (std::size_t q = 0; q < quads_; ++q) {
+    const Lanes steep = steep_lanes(patch, q);
+    if ((steep[0] | steep[1] | steep[2] | steep[3]) != 0) return true;
   }
   return false;
 }
@@ -214,20 +218,42 @@ Float4 ExitanceField::interpolate(const Patch& patch, float u, float v, std::siz
   return larger(value, broadcast(0));  // a parabola may undershoot where light ends
 }
 
-// The values at a place whose nodes are known; false if they have to be evaluated themselves.
-bool ExitanceField::look_up(const Place& place, Rgb* to) const noexcept {
-  const std::uint32_t mark = mark_of(parts_[place.part]);
-  const auto& [a, b, c] = parts_[place.part].data;
+Float4 ExitanceField::interpolate(const Place& place, std::size_t quad) const noexcept {
+  const Part& part = parts_[place.part];
+  const auto& [a, b, c] = part.data;
   const float u = place.u, v = place.v;
-  if (mark & kSteep) return false;
+  if (is_kind(part, kCurved)) return interpolate(patches_[a], u, v, quad);
+  return values(a)[quad] * broadcast(1 - u - v) + values(b)[quad] * broadcast(u) +
+         values(c)[quad] * broadcast(v);
+}
+
+// The values at a place whose nodes are known; false if any has to be evaluated itself.
+bool ExitanceField::look_up(const Place& place, Rgb* to) const noexcept {
+  if (mark_of(parts_[place.part]) & kSteep) return false;
   for (std::size_t q = 0; q < quads_; ++q) {
-    const Float4 value = mark & kCurved ? interpolate(patches_[a], u, v, q)
-                                        : values(a)[q] * broadcast(1 - u - v) + values(b)[q] * broadcast(u) +
-                                              values(c)[q] * broadcast(v);
+    const Float4 value = interpolate(place, q);
     float* const out = &to->x + 4 * q;
     std::memcpy(out, &value, std::min<std::size_t>(4, 3 * materials_ - 4 * q) * sizeof(float));
   }
   return true;
+}
+
+// Where some materials have to be evaluated themselves, the values of the others: each is what it would be
+// without them.
+void ExitanceField::look_up_smooth(const Place& place, Rgb* to) const noexcept {
+  const Patch nodes = patch(parts_[place.part]);
+  std::size_t first = 0;  // lane of a material
+  Lanes steep = steep_lanes(nodes, 0);
+  for (std::size_t m = 0; m < materials_; ++m, first += 3) {
+    int any = 0;
+    for (std::size_t lane = first; lane < first + 3; ++lane) {
+      if (lane % 4 == 0) steep = steep_lanes(nodes, lane / 4);
+      any |= steep[lane % 4];
+    }
+    if (any) continue;
+    for (std::size_t k = 0; k < 3; ++k)
+      to[m][static_cast<int>(k)] = interpolate(place, (first + k) / 4)[(first + k) % 4];
+  }
 }
 
 // Fills the blocks of parts that are looked at for the first time.
@@ -254,8 +280,8 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
     std::uint32_t hit;
     Place place;
   };
-  std::vector<Missing> missing;
-  std::vector<std::uint32_t> parts, steep;
+  std::vector<Missing> missing, steep;
+  std::vector<std::uint32_t> parts;
   Recent recent;
   // What a value is made of lies all over the memory: it is fetched while hits before are at work.
   std::array<Place, kAhead> ahead;
@@ -267,7 +293,7 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
         missing.push_back({i, place});
         if (recent.is_new(place.part)) parts.push_back(place.part);
       } else if (!look_up(place, &exitance[i * materials_])) {
-        steep.push_back(i);
+        steep.push_back({i, place});
       }
     }
     if (next >= hits.size()) continue;
@@ -279,16 +305,20 @@ void ExitanceField::eval(std::span<const Hit> hits, std::span<Rgb> exitance,
   if (!missing.empty()) make_known(parts, evaluations);
   for (std::size_t i = 0; i < missing.size(); ++i) {
     fetch_nodes(parts_[missing[std::min(i + kAhead, missing.size() - 1)].place.part]);
-    if (!look_up(missing[i].place, &exitance[missing[i].hit * materials_])) steep.push_back(missing[i].hit);
+    if (!look_up(missing[i].place, &exitance[missing[i].hit * materials_])) steep.push_back(missing[i]);
   }
   if (steep.empty()) return;
   std::vector<Vec3> positions;
   positions.reserve(steep.size());
-  for (const std::uint32_t i : steep) positions.push_back(hit_position(*meshes_[hits[i].mesh], hits[i]));
+  for (const Missing& one : steep)
+    positions.push_back(hit_position(*meshes_[hits[one.hit].mesh], hits[one.hit]));
   std::vector<Rgb> results(steep.size() * materials_);
   exitance_.eval(positions, results, evaluations);
-  for (std::size_t i = 0; i < steep.size(); ++i)
-    std::copy_n(&results[i * materials_], materials_, &exitance[steep[i] * materials_]);
+  for (std::size_t i = 0; i < steep.size(); ++i) {
+    Rgb* const to = &exitance[steep[i].hit * materials_];
+    std::copy_n(&results[i * materials_], materials_, to);
+    if (materials_ > 1) look_up_smooth(steep[i].place, to);
+  }
 }
 
 }  // namespace nacre

@@ -206,6 +206,49 @@ TEST(ExitanceField, DependsNeitherOnOrderNorOnThreads) {
   EXPECT_EQ(once, together);
 }
 
+// Some materials of a family may have to be evaluated where others are interpolated: of each the same bits
+// as without the others.
+TEST(ExitanceField, DependsOnNoOtherMaterial) {
+  const Mesh mesh = make_graded_square();
+  const Fixture fixture(make_plane(
+      80, +[](const Vec3& p, const Vec3&) { return Rgb(p.x > 0.1f ? 1.0f : 0.0f); }));
+  MaterialFamily family;
+  for (const float absorption : {1.0f, 300.0f, 3.0f, 30.0f, 0.1f}) {
+    family.media.push_back(fixture.medium);
+    family.media.back().sigma_a *= absorption;
+  }
+  const std::size_t count = family.media.size();
+  const std::vector<Hit> hits = make_hits(mesh, 3000);
+  std::uint64_t evaluations = 0;
+  std::vector<std::vector<Rgb>> alone;
+  std::vector<std::uint64_t> costs;
+  for (std::uint32_t m = 0; m < count; ++m) {
+    family.wanted = {m};
+    const Exitance exitance(fixture.owned.group, family, fixture.tolerance);
+    const ExitanceField field({&mesh}, exitance, fixture.distance, fixture.tolerance);
+    alone.emplace_back(hits.size());
+    std::uint64_t own = 0;
+    field.eval(hits, alone.back(), own);
+    costs.push_back(own);
+  }
+  // Else no patch would be steep for some of them only.
+  EXPECT_NE(std::ranges::min(costs), std::ranges::max(costs));
+  for (const std::vector<std::uint32_t>& wanted :
+       {std::vector<std::uint32_t>{0, 1, 2, 3, 4}, std::vector<std::uint32_t>{3, 0},
+        std::vector<std::uint32_t>{1, 4, 2}}) {
+    family.wanted = wanted;
+    const Exitance exitance(fixture.owned.group, family, fixture.tolerance);
+    const ExitanceField field({&mesh}, exitance, fixture.distance, fixture.tolerance);
+    std::vector<Rgb> values(hits.size() * wanted.size());
+    for (int run = 0; run < 2; ++run) {  // at first sight, and known
+      field.eval(hits, values, evaluations);
+      for (std::size_t i = 0; i < hits.size(); ++i)
+        for (std::size_t m = 0; m < wanted.size(); ++m)
+          ASSERT_EQ(values[i * wanted.size() + m], alone[wanted[m]][i]) << i << " " << wanted[m];
+    }
+  }
+}
+
 TEST(ExitanceField, EvaluatesEachNodeOnce) {
   const Fixture fixture(make_plane(90, &side_light), 0.01, 0.3);
   const Mesh mesh = [] {

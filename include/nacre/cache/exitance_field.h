@@ -91,13 +91,17 @@ class ExitanceField {
   void fill_blocks(std::span<const std::uint32_t> blocks, std::uint64_t& evaluations) const;
   void fetch_nodes(const Part& part) const noexcept;
   bool look_up(const Place& place, Rgb* to) const noexcept;
+  void look_up_smooth(const Place& place, Rgb* to) const noexcept;
   void make_known(std::span<const std::uint32_t> parts, std::uint64_t& evaluations) const;
   Float4* values(std::uint32_t node) const noexcept { return values_.data() + node * quads_; }
   void store(std::uint32_t node, const Rgb* materials) const noexcept;
   void unpack(const Float4* packed, Rgb* materials) const noexcept;
   void judge(Part& part) const noexcept;
+  using Lanes = decltype(Float4() > Float4());  // -1 or 0 each
+  Lanes steep_lanes(const Patch& patch, std::size_t quad) const noexcept;
   bool is_steep(const Patch& patch) const noexcept;
   Float4 interpolate(const Patch& patch, float u, float v, std::size_t quad) const noexcept;
+  Float4 interpolate(const Place& place, std::size_t quad) const noexcept;
 
   const Exitance& exitance_;
   std::size_t materials_, quads_;  // Float4 that the materials of a node take, packed
