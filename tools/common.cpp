@@ -65,7 +65,8 @@ void Session::check_report() const {
 }
 
 void Session::warn(const Warnings& warnings) {
-  for (const std::string& warning : warnings) print_message(fmt::format("nacre: warning: {}\n", warning));
+  for (const std::string& warning : warnings)
+    print_message(fmt::format("nacre: warning: {}\n", one_line(warning)));
 }
 
 void Session::finish() {

@@ -32,7 +32,12 @@ if ! command -v clang++ >/dev/null; then
   exit 2
 fi
 [[ -f build/fuzz/build.ninja ]] || cmake --preset fuzz >/dev/null
-cmake --build build/fuzz --target "${targets[@]/#/fuzz_}" >/dev/null
+mkdir -p build/fuzz
+if ! cmake --build build/fuzz --target "${targets[@]/#/fuzz_}" >build/fuzz/build.log 2>&1; then
+  tail -n 30 build/fuzz/build.log >&2
+  echo "fuzz: the fuzzers do not build; see build/fuzz/build.log" >&2
+  exit 2
+fi
 
 # What AddressSanitizer keeps of the memory that is free counts towards the limit.
 export ASAN_OPTIONS="quarantine_size_mb=16:allocator_release_to_os_interval_ms=200:${ASAN_OPTIONS:-}"

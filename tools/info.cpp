@@ -46,7 +46,7 @@ bool show_mesh(const std::string& path) {
   print_topology(report, "  ");
   const std::string problems = describe_problems(report);
   if (!problems.empty()) warnings.push_back(path + ": " + problems);
-  for (const std::string& warning : warnings) fmt::print("  warning: {}\n", warning);
+  for (const std::string& warning : warnings) fmt::print("  warning: {}\n", one_line(warning));
   return !warnings.empty();
 }
 
@@ -67,7 +67,7 @@ void show_exitance(const std::string& path) {
     const auto filled = std::ranges::count(kept.filled, 1);
     fmt::print("{} nodes in {} blocks, {} of them evaluated; made for\n", kept.values.size(),
                kept.filled.size(), filled);
-    for (const auto& [key, value] : kept.key) fmt::print("  {}: {}\n", key, value);
+    for (const auto& [key, value] : kept.key) fmt::print("  {}: {}\n", one_line(key), one_line(value));
   }
 }
 
@@ -106,7 +106,7 @@ void show_lights(const CacheGroup& group, double mean_irradiance) {
 }
 
 void show_group(const CacheGroup& group, const KeyValues& info) {
-  fmt::print("group {}\n", group.name);
+  fmt::print("group {}\n", one_line(group.name));
   fmt::print("  {} samples, {} octree nodes, surface {:.6g} scene units^2\n", group.size(),
              group.nodes.size(), group.surface_area);
   double mm_per_unit = 1;
@@ -142,9 +142,9 @@ void show_cache(const std::string& path) {
   fmt::print("cache {}: format version {}, sound\n", path, version);
   for (const CacheGroup& group : cache.groups) show_group(group, cache.info);
   fmt::print("recorded\n");
-  for (const auto& [key, value] : cache.info) fmt::print("  {}: {}\n", key, value);
+  for (const auto& [key, value] : cache.info) fmt::print("  {}: {}\n", one_line(key), one_line(value));
   fmt::print("depends on (fingerprint {})\n", fingerprint_digest(cache.fingerprint));
-  for (const auto& [key, value] : cache.fingerprint) fmt::print("  {}: {}\n", key, value);
+  for (const auto& [key, value] : cache.fingerprint) fmt::print("  {}: {}\n", one_line(key), one_line(value));
 }
 
 // Returns whether a value is no number, or not what was written.
@@ -158,10 +158,10 @@ bool show_image(const std::string& path) {
     const auto [low, high] = std::minmax_element(channel.values.begin(), channel.values.end());
     double sum = 0;
     for (const float v : channel.values) sum += v;
-    fmt::print("  {:<12} mean {:.5g}, from {:.5g} to {:.5g}\n", channel.name,
+    fmt::print("  {:<12} mean {:.5g}, from {:.5g} to {:.5g}\n", one_line(channel.name),
                sum / static_cast<double>(channel.values.size()), *low, *high);
   }
-  for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", key, value);
+  for (const auto& [key, value] : image.metadata) fmt::print("  {}: {}\n", one_line(key), one_line(value));
   bool flawed = check_seal(image) == Seal::kBroken;
   if (flawed) fmt::print("  is not as nacre wrote it: damaged, or changed by another program\n");
   for (const Channel& channel : image.channels) {
@@ -181,9 +181,9 @@ bool show_scene(const SceneOptions& options, Session& session) {
   session.warn(bodies);
   bool flawed = !scene.warnings.empty() || !bodies.empty();
   for (const Shape& shape : scene.shapes) {
-    fmt::print("shape {} ({}, {})\n", shape.id, shape.type, shape.place);
+    fmt::print("shape {} ({}, {})\n", one_line(shape.id), shape.type, shape.place);
     if (shape.medium != kNone)
-      fmt::print("  translucent: {}\n", medium_name(scene, static_cast<std::size_t>(shape.medium)));
+      fmt::print("  translucent: {}\n", one_line(medium_name(scene, static_cast<std::size_t>(shape.medium))));
     print_topology(analyse_topology(shape.mesh), "  ");
   }
   for (std::size_t m = 0; m < scene.media.size(); ++m) {
@@ -191,7 +191,7 @@ bool show_scene(const SceneOptions& options, Session& session) {
     const Reduced reduced = reduce(medium);
     const MediumExtent extent = measure_medium(scene, m);
     const float length = smallest_mean_free_path(medium);
-    fmt::print("medium {} ({}){}\n", medium_name(scene, m), medium.place,
+    fmt::print("medium {} ({}){}\n", one_line(medium_name(scene, m)), medium.place,
                medium.material.empty() ? "" : ": " + medium.material);
     fmt::print("  sigma_s' {} 1/mm, sigma_a {} 1/mm, g {}, eta {:.4g}\n", vector_text(reduced.sigma_s_prime),
                vector_text(medium.sigma_a), vector_text(medium.g), medium.eta());

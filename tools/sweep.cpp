@@ -125,17 +125,16 @@ void check_folder(const SweepOptions& options, const Scene& scene, std::size_t p
   for (std::size_t i = 0; i < points; ++i)
     for (const char* const ending : {".exr", ".png"})
       outputs.push_back(options.output + "/" + picture_name(i) + ending);
-  std::erase_if(outputs, [](const std::string& output) {
-    std::error_code ignored;
+  std::error_code ignored;
+  std::erase_if(outputs, [&](const std::string& output) {
     return !std::filesystem::exists(std::filesystem::symlink_status(output, ignored));
   });
   check_apart(scene, outputs);
-  for (const std::string& output : outputs) {
-    check_is_none_of(output, {options.cache, options.plan});
-    if (!std::filesystem::is_directory(options.output + "/points"))
-      fail(ErrorCode::kValue, output, "is there, and {} is no folder of a sweep; name another for -o",
-           options.output);
-  }
+  for (const std::string& output : outputs) check_is_none_of(output, {options.cache, options.plan});
+  if (std::filesystem::is_directory(options.output, ignored) &&
+      !std::filesystem::is_directory(options.output + "/points") &&
+      !std::filesystem::is_empty(options.output, ignored))
+    fail(ErrorCode::kValue, options.output, "is not empty, and no folder of a sweep; name another for -o");
   if (!options.common.report_path.empty())
     check_is_none_of(options.common.report_path, {options.output + "/manifest.json"});
 }
@@ -259,7 +258,9 @@ void add_sweep_command(CLI::App& app, const std::string& command_line) {
                    "K/N: render every N-th picture only, from the K-th on; the last one assembles them")
       ->check(not_empty());
   add_render_options(*command, *options);
-  command->get_option("--cache")->required();
+  command->get_option("--cache")->description("Cache that `nacre bake` made")->required();
+  command->get_option("--method")
+      ->description("Diffusion: hierarchical (default) or exact sum over the cache");
   command->add_flag("--no-shadows", options->bake.no_shadows, "As the cache was baked");
   add_common_options(*command, options->common);
   add_engine_options(*command, options->engine);

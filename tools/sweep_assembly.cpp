@@ -92,7 +92,7 @@ void assemble_sweep(const SweepOptions& options, const SweepPlan& plan, const st
   while (std::filesystem::exists(options.output + "/" + picture_name(end) + ".exr")) ++end;
   if (end > points.size())
     session.warn(
-        {fmt::format("{}: pictures {} to {} are of an earlier sweep, the manifest does not name them",
+        {fmt::format("{}: pictures from {} to {} are of an earlier sweep, the manifest does not name them",
                      options.output, picture_name(points.size()), picture_name(end - 1))});
 }
 

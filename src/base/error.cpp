@@ -2,9 +2,7 @@
 #include "nacre/base/error.h"
 
 namespace nacre {
-namespace {
 
-// Names and words from damaged files are quoted in messages: one line each, whatever they hold.
 std::string one_line(std::string text) {
   constexpr std::size_t kLongest = 4096;
   if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
@@ -12,8 +10,6 @@ std::string one_line(std::string text) {
     if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = '?';
   return text;
 }
-
-}  // namespace
 
 Error::Error(ErrorCode error_code, std::string error_place, std::string error_reason)
     : code_(error_code),

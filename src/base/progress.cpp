@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "nacre/base/error.h"
+
 namespace nacre {
 namespace {
 
@@ -50,13 +52,14 @@ void Progress::end() {
 void Progress::say(const std::string& line) {
   const std::lock_guard lock(mutex_);
   if (!shows_progress()) return;
-  print_message(fmt::format("{}{}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line));
+  print_message(fmt::format("{}{}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", one_line(line)));
 }
 
 void Progress::warn(const std::string& line) {
   const std::lock_guard lock(mutex_);
   if (style_ == ProgressStyle::kSilent) return;
-  print_message(fmt::format("{}nacre: warning: {}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", line));
+  print_message(
+      fmt::format("{}nacre: warning: {}\n", style_ == ProgressStyle::kBar ? "\r\033[K" : "", one_line(line)));
 }
 
 void Progress::print(bool final) {

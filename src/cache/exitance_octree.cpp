@@ -230,8 +230,9 @@ void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_e
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t lane = set_->first(k); lane < set_->first(k + 1); ++lane)
       lanes_of[kernel_etas_[lane - set_->first(k)][k]].push_back(lane);
-  for (const auto& [eta, lanes] : lanes_of) {
-    const std::vector<Float4> powers = source_powers(origins, eta, irradiance);
+  for (const auto& seen : lanes_of) {
+    const std::vector<std::size_t>& lanes = seen.second;
+    const std::vector<Float4> powers = source_powers(origins, seen.first, irradiance);
     parallel_for(powers.size(), kRun, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
         for (const std::size_t lane : lanes)

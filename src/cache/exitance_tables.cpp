@@ -90,12 +90,13 @@ Exitance::Exitance(const CacheGroup& group, const MaterialFamily& family, double
     }
     allowance_ = tolerance - tables;
     moment_slack_ += static_cast<float>(jets);
-    if (!(allowance_ > tables))
+    if (!(allowance_ > tables)) {
+      const double digit = std::pow(10.0, std::floor(std::log10(2 * tables)));
       fail(ErrorCode::kLimit, group.name,
            "a tolerance of {:g} cannot be certified, tables and rounding may err by {:.2g}; take one of "
-           "{:.1g} or more, "
-           "or --method exact",
-           tolerance, tables, 2 * tables);
+           "{:.1g} or more, or --method exact",
+           tolerance, tables, digit * (std::floor(2 * tables / digit) + 1));
+    }
   }
   if (promise == Promise::kCalibrated && tolerance >= kMiddlesTolerance)
     for (Kernel& kernel : kernels_) kernel.make_middles();

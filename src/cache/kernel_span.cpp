@@ -15,6 +15,7 @@ constexpr double kRowsPerOctave = 16;
 constexpr double kNearest = 1.0 / 16;  // of the narrowest width: nearer, profiles are flat
 constexpr double kNegligible = 1e-7;
 constexpr double kRounding = 3e-7;  // relative, of a sum in single precision
+constexpr double kDark = 1e-24;     // total of a profile of which single precision makes nothing
 
 // One channel of all materials.
 class ChannelSpan {
@@ -22,7 +23,7 @@ class ChannelSpan {
   ChannelSpan(std::span<const Response> responses, std::size_t channel, double farthest) {
     double nearest = farthest;
     for (std::size_t m = 0; m < responses.size(); ++m)
-      if (const Profile& profile = responses[m].profiles[channel]; profile.total > 0) {
+      if (const Profile& profile = responses[m].profiles[channel]; profile.total > kDark) {
         members_.push_back(m);
         nearest = std::min(nearest, kNearest * profile.width);
       }
@@ -95,7 +96,9 @@ class ChannelSpan {
     const double error = (terms * weights_[i] - wanted).lpNorm<Eigen::Infinity>(),
                  cancelled = (terms.cwiseAbs() * weights_[i].cwiseAbs()).maxCoeff();
     weights_[i] = weights_[i].cwiseQuotient(norms);
-    return error + kRounding * cancelled;
+    constexpr double kHuge = 1e30;  // of which single precision makes something
+    const double sum = error + kRounding * cancelled;
+    return sum < kHuge && weights_[i].lpNorm<Eigen::Infinity>() < kHuge ? sum : kHuge;
   }
 
   std::vector<std::size_t> members_;  // that scatter in this channel

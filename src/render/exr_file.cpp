@@ -30,11 +30,16 @@ constexpr int kZipLevel = 1;
 // Values that one call of OpenEXR decodes.
 constexpr std::int64_t kBlockValues = std::int64_t{1} << 22;
 
-// OpenEXR's own threads follow the limit of nacre's; 0 means the calling thread alone.
+// OpenEXR's own threads follow the limit of nacre's; 0 means the calling thread alone, which has to do where
+// there is no memory for others.
 int match_threads() {
   const int threads = thread_count() > 1 ? thread_count() : 0;
-  if (Imf::globalThreadCount() != threads) Imf::setGlobalThreadCount(threads);
-  return threads;
+  try {
+    if (Imf::globalThreadCount() != threads) Imf::setGlobalThreadCount(threads);
+    return threads;
+  } catch (const std::exception&) {
+    return 0;
+  }
 }
 
 // OpenEXR's view of an AtomicFile. It keeps the first error, because OpenEXR's destructors swallow theirs.

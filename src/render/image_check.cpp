@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include "nacre/base/file.h"
 #include "nacre/base/parallel.h"
 
 namespace nacre {
@@ -16,6 +17,7 @@ void check_values(const Image& image, const std::string& path) {
   std::size_t total = 0;
   for (const BadValues& b : bad) total += b.count;
   if (total == 0) return;
+  MappedFile::check_unchanged();  // that would explain them
   const auto first = std::ranges::find_if(bad, [](const BadValues& b) { return b.count > 0; });
   fail(ErrorCode::kValue, path,
        "not written: {} of the image's values {} NaN or infinite, the first in channel {} at pixel ({}, {}); "

@@ -114,6 +114,7 @@ MediumElement read_medium(const XmlElement& element, const TextureIndex& texture
         fmt::format("{}: material '{}' is in 1/mm and there is no scale: one scene unit is taken as 1 mm",
                     parameters.place("material"), medium.material));
   const bool has_ior = parameters.has("intIOR") || parameters.has("extIOR");
+  medium.index_is_given = has_ior;
   if (has_ior || medium.material.empty()) {
     const Indices ior = read_indices(parameters);
     medium.int_ior = ior.inside;

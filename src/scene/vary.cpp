@@ -89,6 +89,10 @@ void apply_setting(Medium& medium, const Setting& setting, const std::string& pl
     medium.sigma_s = of_preset.sigma_s;
     medium.sigma_a = of_preset.sigma_a;
     medium.g = of_preset.g;
+    if (!medium.index_is_given) {
+      medium.int_ior = of_preset.int_ior;
+      medium.ext_ior = of_preset.ext_ior;
+    }
   } else if (key == "scale") {
     const float given = parse_number(setting, place);
     medium.scale = check(Rgb(setting.relative ? medium.scale * given : given), kLeast, kMost).x;

@@ -94,6 +94,27 @@ TEST(KernelSpan, TakesAllMembersOfChannelsThatSpanNone) {
     }
 }
 
+// Of what hardly scatters at all nothing is made, and others are none the worse.
+TEST(KernelSpan, WeightsAreFiniteBesideMaterialsThatHardlyScatter) {
+  for (const ProfileKind kind :
+       {ProfileKind::kDipole, ProfileKind::kBetterDipole, ProfileKind::kNormalized}) {
+    std::vector<Response> responses;
+    for (const float scattering :
+         {1e-20f, 1e-17f, 1e-12f, 1e-10f, 1e-8f, 1e-6f, 1e-4f, 1.0f, 1e2f, 1e3f, 0.0f}) {
+      Medium medium;
+      medium.profile = kind;
+      medium.sigma_a = Rgb(1e4f);
+      medium.sigma_s = Rgb(scattering);
+      responses.push_back({resolved_profiles(medium, 0.2), {}});
+    }
+    const auto span = find_span(responses, 60, 5e-4);
+    if (!span) continue;
+    for (const auto& weights : span->weights)
+      for (const auto& weight : weights)
+        for (const float w : weight) EXPECT_TRUE(std::isfinite(w));
+  }
+}
+
 // A channel that does not scatter, and one in which all are alike.
 TEST(KernelSpan, TakesChannelsAsTheyAre) {
   auto responses = make_sweep(ProfileKind::kDipole, 20, 3);

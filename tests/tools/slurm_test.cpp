@@ -63,7 +63,7 @@ class Slurm : public testing::Test {
 };
 std::unique_ptr<SlurmCluster> Slurm::cluster_;
 
-constexpr const char* kSweep = "sweep 's p.xml' --cache c.nacre --vary sigma_a=0.01:0.04:4 ";
+constexpr const char* kSweep = "sweep 's p.xml' --cache c.nacre --vary sigma_a=0.01:9:4:log ";
 constexpr const char* kSlow = "--spp 200 ";  // seconds a picture
 
 TEST_F(Slurm, GivesWhatALocalRunGives) {

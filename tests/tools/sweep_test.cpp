@@ -158,7 +158,7 @@ TEST_F(Sweep, ReplacesNothingButSweeps) {
   std::filesystem::copy_file(folder_.file("c.nacre"), folder_.file("own/manifest.json"));
   run(sweep + "--cache own/manifest.json -o own", 2);
   EXPECT_EQ(bytes("own/manifest.json"), bytes("c.nacre"));
-  for (const char* name : {"index.html", "0002.exr"}) {
+  for (const char* name : {"index.html", "0002.exr", "thesis.txt"}) {
     const std::string folder = std::string("of_") + name;
     std::filesystem::create_directory(folder_.file(folder));
     folder_.write(folder + "/" + name, "mine");
@@ -271,13 +271,45 @@ TEST_F(Sweep, NoticesATextureThatChanged) {
 }
 
 TEST_F(Sweep, ShardsMakeTheSameFiles) {
-  const std::string sweep = "sweep s.xml --cache c.nacre --quiet --vary sigma_a=0.01:0.05:5 -o ";
+  // Unlike ones, of which some are interpolated where others are not.
+  const std::string sweep = "sweep s.xml --cache c.nacre --quiet --vary 'sigma_a=0.01;9;0.03;0.4;2' -o ";
   run(sweep + "d");
   run(sweep + "e --shard 2/2");
   EXPECT_FALSE(std::filesystem::exists(folder_.file("e/manifest.json")));
   run(sweep + "e --shard 1/2 --threads 1");
   for (const char* name : {"0001.exr", "0002.exr", "0005.exr", "0004.png", "contact_sheet.png", "index.html"})
     EXPECT_EQ(bytes(std::string("d/") + name), bytes(std::string("e/") + name)) << name;
+}
+
+// In one batch or another.
+TEST_F(Sweep, PicturesThatWereMissingAreTheSameAgain) {
+  const std::string sweep = "sweep s.xml --cache c.nacre --quiet -o d --vary 'sigma_a=0.01;9;0.03;0.4;2'";
+  run(sweep);
+  std::vector<std::string> first;
+  for (int i = 1; i <= 5; ++i) first.push_back(bytes(fmt::format("d/{:04}.exr", i)));
+  for (const char* name : {"d/0001.exr", "d/0004.exr"}) std::filesystem::remove(folder_.file(name));
+  run(sweep);
+  for (std::size_t i = 0; i < first.size(); ++i)
+    EXPECT_EQ(bytes(fmt::format("d/{:04}.exr", i + 1)), first[i]) << i + 1;
+}
+
+// A preset comes with its index of refraction where the scene has none.
+TEST_F(Sweep, PresetsBringTheirIndexOfRefraction) {
+  std::string scene = kScene;
+  const std::string indices = "<float name=\"intIOR\" value=\"$eta\"/><float name=\"extIOR\" value=\"1\"/>";
+  const std::string coefficients = "<rgb name=\"sigmaS\" value=\"$s\"/><rgb name=\"sigmaA\" value=\"$a\"/>";
+  ASSERT_NE(scene.find(indices), std::string::npos);
+  scene.replace(scene.find(indices), indices.size(), "<float name=\"scale\" value=\"1\"/>");
+  ASSERT_NE(scene.find(coefficients), std::string::npos);
+  scene.replace(scene.find(coefficients), coefficients.size(), "<string name=\"material\" value=\"$m\"/>");
+  folder_.write("m.xml", "<!-- -->" + scene);
+  run("bake m.xml -o m.nacre --quiet --points 4000 -D m=Skin1");
+  run("sweep m.xml --cache m.nacre -o d --quiet --vary 'material=Marble;Skin1' --method exact -D m=Skin1");
+  EXPECT_EQ(manifest("d")["pictures"][0]["coefficients"]["eta"], 1.5);
+  for (const char* name : {"Marble", "Skin1"}) {
+    run(fmt::format("render m.xml --cache m.nacre -o r.exr --quiet --method exact -D m={}", name));
+    expect_same(name == std::string("Marble") ? "d/0001.exr" : "d/0002.exr", "r.exr");
+  }
 }
 
 TEST_F(Sweep, TwoSweepsDoNotShareAFolder) {

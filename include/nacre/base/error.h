@@ -24,6 +24,10 @@ enum class ErrorCode {
   kLimit,     // more than this machine or nacre can hold
 };
 
+/// Names and words from files as they may be quoted in a message: one line that does nothing to a terminal,
+/// whatever they hold, and not without end.
+std::string one_line(std::string text);
+
 /// One thing that went wrong: `place` is "file:line", "file: byte N" or "--option"; `reason` says what is
 /// wrong and what to do, in one line. what() is "place: reason".
 class Error : public std::exception {

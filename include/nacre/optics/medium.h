@@ -22,10 +22,11 @@ struct Medium {
   std::string material;  // name of the preset it comes from, or ""
   Rgb sigma_s{0, 0, 0};  // unreduced scattering coefficient
   Rgb sigma_a{0, 0, 0};
-  Rgb g{0, 0, 0};             // mean cosine of Henyey-Greenstein, in (-1, 1)
-  float int_ior = 1.3f;       // inside
-  float ext_ior = 1.000277f;  // outside
-  float scale = 1;            // mm per scene unit
+  Rgb g{0, 0, 0};               // mean cosine of Henyey-Greenstein, in (-1, 1)
+  float int_ior = 1.3f;         // inside
+  float ext_ior = 1.000277f;    // outside
+  bool index_is_given = false;  // by the scene, for whatever preset it is filled with
+  float scale = 1;              // mm per scene unit
   ProfileKind profile = ProfileKind::kDipole;
   Convention convention = Convention::kPublished;
   bool lambert = false;  // the BRDF approximation: light leaves where it entered, by the profile's total

@@ -22,7 +22,7 @@ struct Setting {
 bool is_medium_key(const std::string& key);
 
 /// Changes a medium; all others of its coefficients stay: sigma_s' under a new g, alpha' under a new mfp,
-/// l' under a new albedo.
+/// l' under a new albedo. A preset brings its eta, unless the scene gives one.
 /// Throws Error(kValue, place) for a name that is none, a number that is out of range, and what is not
 /// the medium's.
 void apply_setting(Medium& medium, const Setting& setting, const std::string& place);
