@@ -97,9 +97,11 @@ void render_points(const SweepOptions& options, Scene& scene, std::size_t medium
     if (!density_checked && !scene.media.empty()) {
       // What is finest of all that is rendered.
       const Medium kept = scene.media[medium];
-      scene.media[medium] = (*std::ranges::min_element(points, {}, [](const SweepPoint* p) {
-                              return smallest_mean_free_path(p->material) / p->material.scale;
-                            }))->material;
+      const SweepPoint& finest = **std::ranges::min_element(points, {}, [](const SweepPoint* p) {
+        return smallest_mean_free_path(p->material) / p->material.scale;
+      });
+      scene.media[medium] = finest.material;
+      scene.media[medium].place += fmt::format(": picture {}", picture_name(finest.index));
       session.warn(check_density(scene, cache->cache));
       scene.media[medium] = kept;
       density_checked = true;
