@@ -110,9 +110,12 @@ TEST_F(Faults, StandardStreamsThatCannotBeWritten) {
 TEST_F(Faults, SignalsEndInOneLineAndLeaveNothing) {
   const std::size_t before = folder_.count();
   for (const auto& [name, number] : {std::pair{"INT", 2}, std::pair{"TERM", 15}, std::pair{"HUP", 1}}) {
-    // A shell has SIGINT ignored by what it starts in the background.
-    const ProgramResult result = run("env --default-signal " + kLong + " & sleep 1; kill -" + name +
-                                     " $!; wait $! 2>/dev/null; exit $?");
+    // A shell has SIGINT ignored by what it starts in the background. SigCgt: signals that are caught by now.
+    const ProgramResult result =
+        run("env --default-signal " + kLong +
+            " & for i in {1..1000}; do (( 0x$(awk '/SigCgt/ {print $2}' /proc/$!/status) & 1 )) && break; "
+            "sleep 0.02; done; sleep 1; kill -" +
+            name + " $!; wait $! 2>/dev/null; exit $?");
     EXPECT_EQ(result.exit_code, 128 + number) << result.output;
     EXPECT_NE(result.output.find(std::string("nacre: interrupted by SIG") + name), std::string::npos)
         << result.output;
