@@ -136,9 +136,16 @@ void Exitance::make_kernels(const MaterialFamily& family) {
   const auto profiles = [&](std::size_t i) {
     return resolved_profiles(in_units(family.media[i], unit_), spacing_);
   };
-  for (const std::uint32_t material : family.wanted) kernels_.emplace_back(profiles(material));
+  const std::vector<ChannelChoice> extremes = find_extremes(family.media);
+  // Errors are held against the extremes alone.
+  for (const std::uint32_t material : family.wanted) {
+    const ChannelChoice own{material, material, material};
+    const bool is_guide = std::ranges::find(extremes, own) != extremes.end();
+    kernels_.emplace_back(profiles(material),
+                          is_guide ? Kernel::Envelopes::kWith : Kernel::Envelopes::kWithout);
+  }
   double fastest = 0;
-  for (const ChannelChoice& choice : find_extremes(family.media)) {
+  for (const ChannelChoice& choice : extremes) {
     Guide& guide = guides_.emplace_back();
     const auto wanted = std::ranges::find(family.wanted, choice[0]);
     if (choice[0] == choice[1] && choice[1] == choice[2] && wanted != family.wanted.end()) {
@@ -188,7 +195,8 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
   std::vector<Kernel> kernels;
   for (const ChannelChoice& choice : span->basis) {
     kernels.emplace_back(std::array{responses[choice[0]].profiles[0], responses[choice[1]].profiles[1],
-                                    responses[choice[2]].profiles[2]});
+                                    responses[choice[2]].profiles[2]},
+                         Kernel::Envelopes::kWithout);
     if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
     add_eta(choice);
   }

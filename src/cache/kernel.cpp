@@ -13,7 +13,7 @@ float r2_of_bits(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 }  // namespace
 
-Kernel::Kernel(const std::array<Profile, 3>& profiles) {
+Kernel::Kernel(const std::array<Profile, 3>& profiles, Envelopes envelopes) {
   double narrowest = 1e30, widest = 0;
   for (const Profile& p : profiles) {
     if (p.total <= 0) continue;
@@ -33,7 +33,7 @@ Kernel::Kernel(const std::array<Profile, 3>& profiles) {
 
   const auto octaves = static_cast<std::size_t>(last - first) + 1;
   make_cells(profiles, first, octaves);
-  make_bounds(profiles, first, octaves, start);
+  if (envelopes == Envelopes::kWith) make_bounds(profiles, first, octaves, start);
   make_jets(profiles, first, octaves);
 }
 

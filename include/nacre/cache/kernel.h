@@ -31,8 +31,10 @@ struct KernelTables {
 /// like r^-3), and to 1.5e-4 of the value up to sigma_tr r = 15; it never errs below.
 class Kernel {
  public:
-  /// The profiles have to be bounded (resolve_profile).
-  explicit Kernel(const std::array<Profile, 3>& profiles);
+  enum class Envelopes { kWith, kWithout };
+  /// The profiles have to be bounded (resolve_profile). Without envelopes, `bounds` and `bound_bins` are not
+  /// to be asked for.
+  explicit Kernel(const std::array<Profile, 3>& profiles, Envelopes envelopes = Envelopes::kWith);
 
   /// R_d at squared distance `r2`.
   Float4 eval(float r2) const noexcept {
