@@ -91,6 +91,19 @@ void add_filled(const CaseSetup& setup, const RenderParams& params, std::vector<
   rows.push_back(judged(make_row("d", "any camera after that", params, frame_times), 0.15, errors));
 }
 
+// The largest relative error of any pixel and channel, the darkest included: a certified sum promises it.
+double largest_of_all(const Image& image, const Image& exact) {
+  double largest = 0;
+  for (const char* const channel : {"diffusion.R", "diffusion.G", "diffusion.B"}) {
+    const std::vector<float>& values = find_channel(image, channel)->values;
+    const std::vector<float>& expected = find_channel(exact, channel)->values;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (values[i] != expected[i])
+        largest = std::max(largest, std::abs(double{values[i]} - double{expected[i]}) / double{expected[i]});
+  }
+  return largest;
+}
+
 // (e): a bound on the error of each pixel. `judge` compares all of them with the sum over every sample.
 void add_certified(const CaseSetup& setup, RenderParams params, int runs, bool judge,
                    std::vector<CaseRow>& rows) {
@@ -106,8 +119,7 @@ void add_certified(const CaseSetup& setup, RenderParams params, int runs, bool j
     params.method = Method::kExact;
     Image exact;
     time_first_frame(setup.world, setup.cache, params, &exact);
-    const ImageDifference difference = compare_images(frame, exact, "diffusion");
-    row.errors = {difference.relative_rmse, difference.largest_relative};
+    row.errors = {compare_images(frame, exact, "diffusion").relative_rmse, largest_of_all(frame, exact)};
     row.error_targets = {kTolerance, kTolerance};
   }
   rows.push_back(std::move(row));
