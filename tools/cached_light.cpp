@@ -176,8 +176,7 @@ Warnings check_density(const Scene& scene, const Cache& cache) {
     const Medium& medium = scene.media[m];
     if (medium.lambert) continue;  // uses no samples
     const CacheGroup& group = cache.groups[m];
-    const double spacing =
-        hexagonal_spacing(group.surface_area, static_cast<double>(group.size())) * medium.scale;
+    const double spacing = hexagonal_spacing(group) * medium.scale;
     const double length = smallest_mean_free_path(medium);
     const double blotch = predict_blotch(spacing / length);
     if (blotch > kAcceptableBlotch)

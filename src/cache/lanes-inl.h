@@ -116,6 +116,10 @@ HWY_INLINE VI find_cell(const DistanceBins& bins, VF r2) {
   return hn::Sub(hn::Min(hn::Max(cell, hn::Set(di, bins.first)), hn::Set(di, bins.last)),
                  hn::Set(di, bins.first));
 }
+// The same as indices in memory, for load_fields.
+HWY_INLINE void store_cells(const DistanceBins& bins, VF r2, std::uint32_t* to) {
+  hn::Store(hn::BitCast(U(), find_cell(bins, r2)), U(), to);
+}
 HWY_INLINE VF find_fraction(const DistanceBins& bins, VF r2) {
   const F df;
   const I di;

@@ -37,7 +37,7 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const VF to_rim = hn::Sub(to_centre, radius);
     const VF near = test.certified ? to_rim : to_centre;
     HWY_ALIGN std::uint32_t bins[hn::MaxLanes(df)];
-    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(near, near))), U(), bins);
+    store_cells(test.bins, hn::Mul(near, near), bins);
     const auto [to_lean, to_bend, as_point, in_series] = load_fields(test.limits, bins, kLean);
     // In a series, as a point.
     const VF moments = hn::MulAdd(hn::Set(df, test.third), radius, hn::Set(df, test.reach));
@@ -49,7 +49,7 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) {
     const auto far = hn::And(apart, hn::Le(series_error, in_series));
     const auto point = hn::AndNot(far, hn::And(apart, hn::Le(point_error, as_point)));
     const auto rest = hn::AndNot(far, hn::AndNot(point, lit));
-    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_rim, to_rim))), U(), bins);
+    store_cells(test.bins, hn::Mul(to_rim, to_rim), bins);
     const auto scattered = hn::And(hn::And(rest, hn::Gt(to_rim, hn::Zero(df))),
                                    hn::Ge(load_fields(test.limits, bins, kLean).d, hn::Zero(df)));
     const auto near_rest = hn::AndNot(scattered, rest);
@@ -75,7 +75,7 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
     const VF r = hn::Sqrt(length2(hn::Sub(x, cx), hn::Sub(y, cy), hn::Sub(z, cz)));
     const VF to_sample = hn::Sub(r, hn::Set(df, test.radius));
     HWY_ALIGN std::uint32_t bins[hn::MaxLanes(df)];
-    hn::Store(hn::BitCast(U(), find_cell(test.bins, hn::Mul(to_sample, to_sample))), U(), bins);
+    store_cells(test.bins, hn::Mul(to_sample, to_sample), bins);
     const auto far = hn::And(hn::And(batch.valid, hn::Gt(to_sample, hn::Zero(df))),
                              hn::Ge(load_fields(test.limits, bins, kLean).d, hn::Zero(df)));
     append(lists.far_samples, lists.far_samples.room(lanes), batch.index, far);

@@ -193,7 +193,7 @@ HWY_INLINE std::uint64_t add_nodes(const KernelTables* kernels, const CoarseTest
       const KernelTables& kernel = kernels[g];
       const auto* const cells = reinterpret_cast<const CoarseCell<kInterpolated>*>(kernel.cells);
       HWY_ALIGN std::uint32_t rows[hn::MaxLanes(df)];
-      hn::Store(hn::BitCast(U(), find_cell(kernel.cell_bins, r2)), U(), rows);
+      store_cells(kernel.cell_bins, r2, rows);
       FourFields value = load_fields(cells, rows, 0);
       if constexpr (kInterpolated) {
         const FourFields delta = load_fields(cells, rows, 4);
