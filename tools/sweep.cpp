@@ -163,7 +163,7 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
   if (of_medium && scene.media.empty())
     fail(ErrorCode::kValue, options.scene.path, "has no translucent medium to vary");
   const std::size_t medium = find_medium(scene, options.medium, of_medium);
-  double spacing = 0;
+  Body body;
   const auto [conditions, of_whole] = [&] {
     const StageTimer timer(session.report(), "read_cache");
     const Cache cache = load_cache(options.cache);
@@ -171,7 +171,8 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     std::array<KeyValues, 2> result{make_conditions(options, params, scene, cache)};
     params.crop_x = params.crop_y = params.crop_width = params.crop_height = 0;
     result[1] = make_conditions(options, params, scene, cache);
-    if (medium < cache.groups.size()) spacing = hexagonal_spacing(cache.groups[medium]);
+    if (medium < cache.groups.size() && cache.groups[medium].size() > 0)
+      body = {hexagonal_spacing(cache.groups[medium]), double{cache.groups[medium].nodes[0].radius}};
     for (KeyValues& values : result) values.emplace_back("medium", options.medium);
     return result;
   }();
@@ -182,7 +183,7 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     media.push_back(points.back().material);
   }
   const MaterialFamilies materials =
-      sort_materials(media, spacing, mixes_eta(make_render_params(options, scene, options.camera)));
+      sort_materials(media, body, mixes_eta(make_render_params(options, scene, options.camera)));
   for (SweepPoint& point : points) {
     point.key = make_sweep_key(conditions, point, materials);
     point.whole = make_sweep_key(of_whole, point, materials);

@@ -14,8 +14,11 @@ namespace nacre {
 namespace {
 
 constexpr float kAbsorbing = 0.8f;  // albedo below which much is absorbed
-// By what factors mean free paths differ within a family, and extinction coefficients within a group.
-constexpr double kLengths = 8.001, kExtinctions = 1.4143;
+// By what factors mean free paths differ within a family, how fast R_d falls, and extinction coefficients
+// within a group.
+constexpr double kLengths = 4.001, kDecays = 3, kExtinctions = 1.4143;
+// How much of a body light goes through without anywhere being dark, in lengths over which R_d falls by e.
+constexpr double kClear = 8;
 
 auto family_key(const Medium& medium, bool mixes_eta) {
   const float eta = mixes_eta && !medium.lambert ? 0 : medium.eta();
@@ -57,9 +60,16 @@ bool is_sparse(const Medium& medium, double spacing) { return spacing > length_o
 
 bool absorbs_much(const Medium& medium) { return min_channel(reduce(medium).alpha_prime) < kAbsorbing; }
 
-MaterialFamilies sort_materials(std::span<const Medium> media, double spacing, bool mixes_eta) {
+MaterialFamilies sort_materials(std::span<const Medium> media, const Body& body, bool mixes_eta) {
   const auto key_of = [&](const Medium& medium) {
-    return std::pair(family_key(medium, mixes_eta), is_sparse(medium, spacing));
+    return std::pair(family_key(medium, mixes_eta), is_sparse(medium, body.spacing));
+  };
+  const auto decays = [&](std::size_t i) {
+    double most = kClear;
+    if (is_sparse(media[i], body.spacing)) return most;
+    for (const Profile& profile : make_profiles(media[i]))
+      if (profile.total > 0) most = std::max(most, profile.decay() * body.radius);
+    return most;
   };
   std::map<decltype(key_of(media[0])), std::size_t> keys;
   std::vector<Indices> groups;
@@ -68,6 +78,7 @@ MaterialFamilies sort_materials(std::span<const Medium> media, double spacing, b
     if (at == groups.size()) groups.emplace_back();
     groups[at].push_back(i);
   }
+  groups = split(groups, kDecays, decays);
   groups = split(groups, kLengths, [&](std::size_t i) { return length_of(media[i]); });
   MaterialFamilies result;
   result.places.resize(media.size());
