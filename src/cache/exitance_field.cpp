@@ -230,11 +230,14 @@ Float4 ExitanceField::interpolate(const Place& place, std::size_t quad) const no
 // The values at a place whose nodes are known; false if any has to be evaluated itself.
 bool ExitanceField::look_up(const Place& place, Rgb* to) const noexcept {
   if (mark_of(parts_[place.part]) & kSteep) return false;
-  for (std::size_t q = 0; q < quads_; ++q) {
+  float* out = &to->x;
+  const std::size_t last = quads_ - 1;
+  for (std::size_t q = 0; q < last; ++q, out += 4) {
     const Float4 value = interpolate(place, q);
-    float* const out = &to->x + 4 * q;
-    std::memcpy(out, &value, std::min<std::size_t>(4, 3 * materials_ - 4 * q) * sizeof(float));
+    std::memcpy(out, &value, sizeof(value));
   }
+  const Float4 value = interpolate(place, last);
+  for (std::size_t lane = 0; lane < 3 * materials_ - 4 * last; ++lane) out[lane] = value[lane];
   return true;
 }
 
