@@ -121,28 +121,24 @@ void Exitance::make_limits(const Target& target, Room& room) const {
   const double radius_scale = 1 / std::cbrt(allowed);
   const double classes = std::ceil(
       kRadiiPerOctave * std::log2(radius_scale * double{target.radius} / (kSmallestRadius * cell_size_)));
-  const auto data = [](const std::array<std::vector<float>, 3>& channels) {
-    return std::array<const float*, 3>{channels[0].data(), channels[1].data(), channels[2].data()};
-  };
-  room.limits.resize(lean_.size());
+  std::array<LimitTerm, 3 * kMostGuides> terms;
+  std::size_t count = 0;
   for (std::size_t g = 0; g < guides_.size(); ++g) {
     const Guide& guide = guides_[g];
-    Rgb share(0, 0, 0);
-    const double factor = 0.5 * allowance_;
-    for (int k = 0; k < 3; ++k)
-      if (nodes_[0].power[k] > 0)
-        share[k] = static_cast<float>(factor) * target.total[g][k] / nodes_[0].power[k];
     const Radius& radius = guide.radii[static_cast<std::size_t>(
         std::clamp(classes, 0.0, static_cast<double>(guide.radii.size() - 1)))];
-    lanes::make_limits(
-        {lean_.data(), bend_.data(), data(radius.as_point), data(radius.in_series), data(guide.per_third)},
-        share, lean_.size(), g > 0, room.limits.data());
-  }
-  if (allowed < 1)
-    for (Limits& limit : room.limits) {
-      limit.as_point *= static_cast<float>(allowed);
-      limit.in_series *= static_cast<float>(allowed);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!guide.limits[k]) continue;
+      const auto channel = static_cast<int>(k);
+      const float share =
+          static_cast<float>(0.5 * allowance_) * target.total[g][channel] / nodes_[0].power[channel];
+      terms[count++] = {share, guide.per_third[k].data(), radius.as_point[k].data(),
+                        radius.in_series[k].data()};
     }
+  }
+  room.limits.resize(lean_.size());
+  lanes::make_limits(std::span(terms).first(count), lean_.data(), bend_.data(), static_cast<float>(allowed),
+                     lean_.size(), room.limits.data());
   // All that is nearer than the bins reach.
   room.limits[0].as_point = room.limits[0].in_series = -1;
 }
@@ -170,7 +166,7 @@ void Exitance::eval_point(const Target& target, const Point& point, Room& room) 
   room.far.resize(set_->width());
   target.set_far.eval(x - target.centre, room.far);
   room.totals.assign(room.far.begin(), room.far.end());
-  lanes::add_sources(set_for(target), room.list, source_powers(), x, room.totals);
+  lanes::add_sources(set_for(target), room.list, x, room.totals);
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t first = set_->first(k), last = set_->first(k + 1);
     const auto channel = static_cast<int>(k);
@@ -200,6 +196,7 @@ void Exitance::eval_outside(const Point& point, Room& room) const {
   room.list.clear();
   for (std::size_t i = 0; i < source_count_; ++i) room.list.add(sources_[i]);
   room.list.pad();
+  room.list.copy_rows(source_powers(), row_width_);
   eval_point(target, point, room);
 }
 
@@ -291,6 +288,7 @@ void Exitance::eval_target(std::span<const Point> range, int level, const Target
       room.list.add({node.x, node.y, node.z, 0, node_powers() ? with_row(node.power, row) : node.power});
     }
     room.list.pad();
+    if (source_powers()) room.list.copy_rows(source_powers(), row_width_);
     for (const Point& point : range) eval_point(target, point, room);
     return;
   }

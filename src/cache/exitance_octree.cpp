@@ -221,22 +221,19 @@ std::vector<Float4> Exitance::source_powers(std::span<const std::uint32_t> origi
 void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_eta,
                            const IrradianceForEta& irradiance) {
   add_all_moments(source_powers(origins, most_eta, irradiance));
-  set_width_ = set_->width();
-  powers_ = LargeArray<float>((source_count_ + node_count_) * set_width_);
+  const std::size_t width = set_->row_width();
+  row_width_ = width;
+  powers_ = LargeArray<float>((source_count_ + node_count_) * width);
   parallel_for(source_count_ + node_count_, kRun, [&](std::size_t begin, std::size_t end) {
-    std::fill(powers_.data() + begin * set_width_, powers_.data() + end * set_width_, 0.0f);
+    std::fill(powers_.data() + begin * width, powers_.data() + end * width, 0.0f);
   });
-  std::map<double, std::vector<std::size_t>> lanes_of;  // by index
-  for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t lane = set_->first(k); lane < set_->first(k + 1); ++lane)
-      lanes_of[kernel_etas_[lane - set_->first(k)][k]].push_back(lane);
-  for (const auto& seen : lanes_of) {
-    const std::vector<std::size_t>& lanes = seen.second;
-    const std::vector<Float4> powers = source_powers(origins, seen.first, irradiance);
+  for (std::uint32_t light = 0; light < light_etas_.size(); ++light) {
+    std::map<std::size_t, std::size_t> columns;  // and their channels
+    set_->for_each_column(light, [&](std::size_t column, std::size_t k) { columns[column] = k; });
+    const std::vector<Float4> powers = source_powers(origins, light_etas_[light], irradiance);
     parallel_for(powers.size(), kRun, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        for (const std::size_t lane : lanes)
-          powers_[i * set_width_ + lane] = powers[i][set_->channels()[lane]];
+        for (const auto& [column, k] : columns) powers_[i * width + column] = powers[i][k];
     });
   }
   for (std::uint32_t i = 0; i < source_count_; ++i) sources_[i].power = with_row(sources_[i].power, i);
@@ -244,11 +241,11 @@ void Exitance::make_powers(std::span<const std::uint32_t> origins, double most_e
   for (std::size_t n = node_count_; n-- > 0;) {
     const SumNode& node = nodes_[n];
     const bool is_leaf = node.child_count() == 0;
-    float* const to = powers_.data() + (source_count_ + n) * set_width_;
-    const float* from = powers_.data() + (is_leaf ? node.first : source_count_ + node.first) * set_width_;
+    float* const to = powers_.data() + (source_count_ + n) * width;
+    const float* from = powers_.data() + (is_leaf ? node.first : source_count_ + node.first) * width;
     const std::uint32_t count = is_leaf ? node.sample_count() : node.child_count();
-    for (std::uint32_t c = 0; c < count; ++c, from += set_width_)
-      for (std::size_t lane = 0; lane < set_width_; ++lane) to[lane] += from[lane];
+    for (std::uint32_t c = 0; c < count; ++c, from += width)
+      for (std::size_t lane = 0; lane < width; ++lane) to[lane] += from[lane];
   }
 }
 

@@ -155,12 +155,15 @@ void Exitance::make_kernels(const MaterialFamily& family) {
       kernels_.emplace_back(
           std::array{profiles(choice[0])[0], profiles(choice[1])[1], profiles(choice[2])[2]});
     }
-    for (std::size_t k = 0; k < 3; ++k)
-      if (const Profile profile = make_profiles(in_units(family.media[choice[k]], unit_))[k];
-          profile.total > 0) {
-        fastest = std::max(fastest, profile.decay());
-        guide.lit[static_cast<int>(k)] = static_cast<float>(profile.total);
-      }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Profile profile = make_profiles(in_units(family.media[choice[k]], unit_))[k];
+      if (!(profile.total > 0)) continue;
+      fastest = std::max(fastest, profile.decay());
+      guide.lit[static_cast<int>(k)] = static_cast<float>(profile.total);
+      const auto& before = std::span(extremes).first(guides_.size() - 1);
+      guide.limits[k] =
+          std::ranges::none_of(before, [&](const ChannelChoice& other) { return other[k] == choice[k]; });
+    }
   }
   // If light is absorbed rather than scattered R_d falls within a mean free path, and in the dark the sum is
   // a few nodes, whose errors do not cancel. Hardly any less where it falls within one or more, a tenth at
@@ -172,11 +175,6 @@ void Exitance::make_kernels(const MaterialFamily& family) {
 // Many materials are combinations of a few kernels. Those are of the whole family, whatever is wanted of it.
 void Exitance::make_set(const MaterialFamily& family, double tolerance, double farthest) {
   const bool mixed = eta_range(family).is_mixed();
-  const auto add_eta = [&](const ChannelChoice& choice) {
-    if (mixed)
-      kernel_etas_.push_back({double{family.media[choice[0]].eta()}, double{family.media[choice[1]].eta()},
-                              double{family.media[choice[2]].eta()}});
-  };
   kernel_count_ = material_count_;
   std::optional<KernelSpan> span;
   std::vector<Response> responses;
@@ -187,8 +185,10 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
     span = find_span(responses, farthest, kSpanShare * tolerance);
   }
   if (!span) {
-    add_set(std::span(kernels_).first(material_count_), {material_count_, material_count_, material_count_});
-    for (const std::uint32_t material : family.wanted) add_eta({material, material, material});
+    std::vector<ChannelChoice> choices;
+    for (const std::uint32_t material : family.wanted) choices.push_back({material, material, material});
+    add_set(std::span(kernels_).first(material_count_), {material_count_, material_count_, material_count_},
+            choices, family);
     return;
   }
   kernel_count_ = span->basis.size();
@@ -198,18 +198,29 @@ void Exitance::make_set(const MaterialFamily& family, double tolerance, double f
                                     responses[choice[2]].profiles[2]},
                          Kernel::Envelopes::kWithout);
     if (tolerance >= kMiddlesTolerance) kernels.back().make_middles();
-    add_eta(choice);
   }
-  add_set(kernels, span->counts);
+  add_set(kernels, span->counts, span->basis, family);
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t j = 0; j < span->counts[k]; ++j)
       for (const std::uint32_t material : family.wanted) weights_.push_back(span->weights[material][j][k]);
 }
 
-void Exitance::add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts) {
-  set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kAny);
+// `choices` are the materials that kernels are of, by channel.
+void Exitance::add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts,
+                       std::span<const ChannelChoice> choices, const MaterialFamily& family) {
+  KernelLights lights;
+  if (eta_range(family).is_mixed())
+    for (const ChannelChoice& choice : choices)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double eta = double{family.media[choice[k]].eta()};
+        const auto known = std::ranges::find(light_etas_, eta);
+        if (k == 0) lights.emplace_back();
+        lights.back()[k] = static_cast<std::uint32_t>(known - light_etas_.begin());
+        if (known == light_etas_.end()) light_etas_.push_back(eta);
+      }
+  set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kAny, lights);
   if (!set_->interpolated())
-    dark_set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kExact);
+    dark_set_ = std::make_unique<const KernelSet>(kernels, counts, KernelSet::Tables::kExact, lights);
 }
 
 // Samples at distances up to rho around their centroid, seen from within R of a target's centre: with their
@@ -252,8 +263,10 @@ void Exitance::make_tables(Guide& guide, std::size_t count) {
     return std::bit_cast<float>((bins_.first + static_cast<std::int32_t>(bin)) << bins_.shift);
   };
   const double area = double{unit_} * double{unit_} * group_.surface_area;
-  for (int k = 0; k < 3; ++k)
+  for (int k = 0; k < 3; ++k) {
+    guide.limits[static_cast<std::size_t>(k)] &= root.power[k] > 0;
     guide.lit[k] *= area > 0 ? static_cast<float>(double{root.power[k]} / area) : 0.0f;
+  }
   for (auto& channel : guide.per_third) channel.assign(padded, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const Kernel::Bounds& bounds = kernel.bounds(edge2(i));

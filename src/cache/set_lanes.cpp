@@ -48,48 +48,119 @@ struct SetRows : RunRows<kInterpolated, kRun> {
   }
 };
 
-// What lanes from `lane` on see of a power: each its channel's, or with kOwnPowers what a row has for it.
-template <bool kOwnPowers, class D>
+// What lanes from `lane` on see of a power, or of a row of powers.
+template <KernelSet::Rows kRows, class D>
 struct LanePowers {
+  using Rows = KernelSet::Rows;
   D d;
+  static constexpr std::size_t kLanes = hn::MaxLanes(D()),
+                               kParts = kRows == Rows::kFewLights ? KernelSet::kFewColumns / kLanes : 1;
 #if HWY_TARGET == HWY_SCALAR
-  std::uint32_t channel;
+  std::uint32_t column;
 #else
-  decltype(hn::SetTableIndices(D(), static_cast<const std::int32_t*>(nullptr))) channels;
+  decltype(hn::SetTableIndices(D(), static_cast<const std::int32_t*>(nullptr))) columns;
+  hn::Mask<D> in_part[kParts];  // of a row, which of its vectors a lane looks into
 #endif
   const float* rows;
   std::size_t width;
 
   HWY_INLINE LanePowers(D tag, const KernelSet& set, const float* powers, std::size_t lane)
-      : d(tag),
+      : d(tag), rows(powers + (kRows == Rows::kLanes ? lane : 0)), width(set.row_width()) {
 #if HWY_TARGET == HWY_SCALAR
-        channel(set.channels()[lane]),
+    column = set.columns()[lane];
 #else
-        channels(hn::SetTableIndices(d, reinterpret_cast<const std::int32_t*>(set.channels() + lane))),
+    const hn::RebindToSigned<D> di;
+    HWY_ALIGN std::int32_t within[kLanes], part[kLanes];
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      // A row of the lanes' own is read as it is.
+      const std::uint32_t of_row = kRows == Rows::kLanes ? 0 : set.columns()[lane + i];
+      within[i] = static_cast<std::int32_t>(of_row % kLanes);
+      part[i] = static_cast<std::int32_t>(of_row / kLanes);
+    }
+    columns = hn::SetTableIndices(d, within);
+    for (std::size_t p = 0; p < kParts; ++p)
+      in_part[p] = hn::RebindMask(d, hn::Eq(hn::Load(di, part), hn::Set(di, static_cast<std::int32_t>(p))));
 #endif
-        rows(powers + (kOwnPowers ? lane : 0)),
-        width(set.width()) {
   }
   HWY_INLINE hn::Vec<D> get(const Float4& power, std::size_t row) const {
-    if constexpr (kOwnPowers)
-      return hn::LoadU(d, rows + row * width);
-    else
+    const float* const at = rows + row * width;
 #if HWY_TARGET == HWY_SCALAR
-      return hn::Set(d, power[static_cast<int>(channel)]);
+    return kRows == Rows::kLanes   ? hn::LoadU(d, at)
+           : kRows == Rows::kPower ? hn::Set(d, power[static_cast<int>(column)])
+                                   : hn::Set(d, at[column]);
 #else
-      return hn::TableLookupLanes(hn::LoadDup128(d, reinterpret_cast<const float*>(&power)), channels);
+    if constexpr (kRows == Rows::kLanes) {
+      return hn::LoadU(d, at);
+    } else if constexpr (kRows == Rows::kPower) {
+      return hn::TableLookupLanes(hn::LoadDup128(d, reinterpret_cast<const float*>(&power)), columns);
+    } else {
+      hn::Vec<D> seen = hn::TableLookupLanes(hn::LoadU(d, at), columns);
+      for (std::size_t p = 1; p < kParts; ++p)
+        seen = hn::IfThenElse(in_part[p], hn::TableLookupLanes(hn::LoadU(d, at + p * kLanes), columns), seen);
+      return seen;
+    }
 #endif
   }
 };
+
+// Calls `action` with whether a set is interpolated and with its rows, as the compiler knows them.
+template <class Action>
+HWY_INLINE void with_kind(const KernelSet& set, const Action& action) {
+  using Rows = KernelSet::Rows;
+  with_truth(set.interpolated(), [&](auto interpolated) HWY_ATTR {
+    switch (set.rows()) {
+      case Rows::kPower:
+        return action(interpolated, std::integral_constant<Rows, Rows::kPower>());
+      case Rows::kFewLights:
+        return action(interpolated, std::integral_constant<Rows, Rows::kFewLights>());
+      case Rows::kLanes:
+        return action(interpolated, std::integral_constant<Rows, Rows::kLanes>());
+    }
+  });
+}
 
 template <class D>
 HWY_INLINE void add_to(D d, float* to, hn::Vec<D> value) {
   hn::StoreU(hn::Add(hn::LoadU(d, to), value), d, to);
 }
 
-// With kOwnPowers each kernel sees a light of its own.
-template <bool kInterpolated, bool kOwnPowers>
-HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
+// Sources of a list that lie side by side.
+struct Run {
+  const Float4* powers;
+  const float* rows;
+  std::size_t size;
+};
+
+// Adds a run to the totals of so many vectors of lanes at once.
+template <class D, std::size_t kVectors, KernelSet::Rows kRows, class Table>
+HWY_INLINE void add_run(const KernelSet& set, const Table& table, const Run& run, std::size_t lane,
+                        std::span<double> totals) {
+  const D d;
+  const std::size_t step = hn::Lanes(d);
+  const LanePowers<kRows, D> first(d, set, run.rows, lane),
+      last(d, set, run.rows, lane + (kVectors - 1) * step);
+  hn::Vec<D> even[kVectors], odd[kVectors];
+  for (std::size_t v = 0; v < kVectors; ++v) even[v] = odd[v] = hn::Zero(d);
+  const auto add = [&](std::size_t i, hn::Vec<D>* sums) HWY_ATTR {
+    for (std::size_t v = 0; v < kVectors; ++v)
+      sums[v] = hn::MulAdd((v == 0 ? first : last).get(run.powers[i], i), table.get(d, i, 0, lane + v * step),
+                           sums[v]);
+  };
+  std::size_t i = 0;
+  for (; i + 1 < run.size; i += 2) {
+    add(i, even);
+    add(i + 1, odd);
+  }
+  if (i < run.size) add(i, even);
+  HWY_ALIGN float sums[hn::MaxLanes(d)];
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    hn::Store(hn::Add(even[v], odd[v]), d, sums);
+    for (std::size_t k = 0; k < step; ++k) totals[lane + v * step + k] += static_cast<double>(sums[k]);
+  }
+}
+
+template <bool kInterpolated, KernelSet::Rows kRows>
+HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec3& x,
                          std::span<double> totals) {
   const F df;
   constexpr std::size_t kRun = 256;
@@ -105,38 +176,26 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const flo
                 length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
                         hn::Sub(load(SourceList::kZ), cz)));
     }
-    const Float4* const power = list.powers() + begin;
-    for_each_vector(set, [&](auto d, std::size_t lane) HWY_ATTR {
-      using D = decltype(d);
-      const LanePowers<kOwnPowers, D> seen(d, set, powers, lane);
-      const auto term = [&](std::size_t i, hn::Vec<D> sum) HWY_ATTR {
-        return hn::MulAdd(seen.get(power[i], power_row(power[i])), rows.get(d, i, 0, lane), sum);
-      };
-      hn::Vec<D> even = hn::Zero(d), odd = even;
-      std::size_t i = 0;
-      for (; i + 1 < size; i += 2) {
-        even = term(i, even);
-        odd = term(i + 1, odd);
-      }
-      if (i < size) even = term(i, even);
-      HWY_ALIGN float sums[hn::MaxLanes(d)];
-      hn::Store(hn::Add(even, odd), d, sums);
-      for (std::size_t k = 0; k < hn::Lanes(d); ++k) totals[lane + k] += static_cast<double>(sums[k]);
-    });
+    const Run run{list.powers() + begin, list.rows() + begin * set.row_width(), size};
+    std::size_t lane = 0;
+    for (; lane + 2 * hn::Lanes(Wide()) <= set.width(); lane += 2 * hn::Lanes(Wide()))
+      add_run<Wide, 2, kRows>(set, rows, run, lane, totals);
+    for (; lane + hn::Lanes(Wide()) <= set.width(); lane += hn::Lanes(Wide()))
+      add_run<Wide, 1, kRows>(set, rows, run, lane, totals);
+    for (; lane < set.width(); lane += hn::Lanes(Narrow()))
+      add_run<Narrow, 1, kRows>(set, rows, run, lane, totals);
   }
 }
 
-void add_set_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
-                     std::span<double> totals) {
-  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
-    add_list<interpolated.value, own.value>(set, list, powers, x, totals);
-  });
+void add_set_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
+  with_kind(set, [&](auto interpolated, auto rows)
+                     HWY_ATTR { add_list<interpolated.value, rows.value>(set, list, x, totals); });
 }
 
 // Monomials of a source's offset, and of second moments their trace and twice what they stretch along it.
 enum Weight { kX, kY, kZ, kXX, kYY, kZZ, kYZ, kZX, kXY, kTrace, kStretch, kWeights };
 
-template <bool kInterpolated, bool kOwnPowers, class Struct>
+template <bool kInterpolated, KernelSet::Rows kRows, class Struct>
 HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const float* powers,
                             std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
   const F df;
@@ -182,7 +241,7 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const f
     for_each_vector(set, [&](auto d, std::size_t lane) HWY_ATTR {
       using D = decltype(d);
       using V = hn::Vec<D>;
-      const LanePowers<kOwnPowers, D> seen(d, set, powers, lane);
+      const LanePowers<kRows, D> seen(d, set, powers, lane);
       // Each sum in a register of its own.
       const V none = hn::Zero(d);
       V value = none, trace = none, x = none, y = none, z = none, xx = none, yy = none, zz = none, yz = none,
@@ -226,14 +285,14 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const f
 
 void add_set_nodes(const KernelSet& set, const SumNode* nodes, const float* powers,
                    std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
-  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
-    add_structs<interpolated.value, own.value>(set, nodes, powers, far, centre, expansion);
+  with_kind(set, [&](auto interpolated, auto rows) HWY_ATTR {
+    add_structs<interpolated.value, rows.value>(set, nodes, powers, far, centre, expansion);
   });
 }
 void add_set_samples(const KernelSet& set, const SumSource* sources, const float* powers,
                      std::span<const std::uint32_t> far, const Vec3& centre, float* expansion) {
-  with_truths(set.interpolated(), powers != nullptr, [&](auto interpolated, auto own) HWY_ATTR {
-    add_structs<interpolated.value, own.value>(set, sources, powers, far, centre, expansion);
+  with_kind(set, [&](auto interpolated, auto rows) HWY_ATTR {
+    add_structs<interpolated.value, rows.value>(set, sources, powers, far, centre, expansion);
   });
 }
 
@@ -247,9 +306,8 @@ HWY_EXPORT(add_set_sources);
 HWY_EXPORT(add_set_nodes);
 HWY_EXPORT(add_set_samples);
 
-void add_sources(const KernelSet& set, const SourceList& list, const float* powers, const Vec3& x,
-                 std::span<double> totals) {
-  HWY_DYNAMIC_DISPATCH(add_set_sources)(set, list, powers, x, totals);
+void add_sources(const KernelSet& set, const SourceList& list, const Vec3& x, std::span<double> totals) {
+  HWY_DYNAMIC_DISPATCH(add_set_sources)(set, list, x, totals);
 }
 void add_series(const KernelSet& set, const SumNode* nodes, const float* powers,
                 std::span<const std::uint32_t> far, const Vec3& centre, SetExpansion& expansion) {

@@ -91,20 +91,19 @@ void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& l
   }
 }
 
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits) {
+void make_limits(std::span<const LimitTerm> terms, const float* lean, const float* bend, float scale,
+                 std::size_t count, Limits* limits) {
   const F df;
+  const VF by = hn::Set(df, scale);
   for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
-    VF lean, bend, point = hn::Set(df, 3e38f), series = point;
-    if (lower)
-      hn::LoadInterleaved4(df, reinterpret_cast<const float*>(limits + i), lean, bend, point, series);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const VF allowed =
-          hn::Mul(hn::Set(df, share[static_cast<int>(k)]), hn::LoadU(df, tables.per_third[k] + i));
-      point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, tables.as_point[k] + i)));
-      series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, tables.in_series[k] + i)));
+    VF point = hn::Set(df, 3e38f), series = point;
+    for (const LimitTerm& term : terms) {
+      const VF allowed = hn::Mul(hn::Set(df, term.share), hn::LoadU(df, term.per_share + i));
+      point = hn::Min(point, hn::Add(allowed, hn::LoadU(df, term.as_point + i)));
+      series = hn::Min(series, hn::Add(allowed, hn::LoadU(df, term.in_series + i)));
     }
-    hn::StoreInterleaved4(hn::LoadU(df, tables.lean + i), hn::LoadU(df, tables.bend + i), point, series, df,
-                          reinterpret_cast<float*>(limits + i));
+    hn::StoreInterleaved4(hn::LoadU(df, lean + i), hn::LoadU(df, bend + i), hn::Mul(by, point),
+                          hn::Mul(by, series), df, reinterpret_cast<float*>(limits + i));
   }
 }
 
@@ -131,6 +130,18 @@ void SourceList::add(const SumSource& source) {
   ++size_;
 }
 
+void SourceList::copy_rows(const float* rows, std::size_t width) {
+  rows_.resize(std::max(rows_.size(), size_ * width));
+  constexpr std::size_t kAhead = 16;  // within what `pad` adds
+  Float4* to = reinterpret_cast<Float4*>(rows_.data());
+  for (std::size_t i = 0; i < size_; ++i) {
+    __builtin_prefetch(rows + power_row(powers_[i + kAhead]) * width);
+    const Float4* const from = reinterpret_cast<const Float4*>(rows + power_row(powers_[i]) * width);
+#pragma GCC unroll 4
+    for (std::size_t c = 0; c < width / 4; ++c) *to++ = from[c];
+  }
+}
+
 void SourceList::pad() {
   if (size_ == 0) return;
   reserve(0);
@@ -150,8 +161,9 @@ void sort_nodes(const NodeTest& test, SortedNodes& lists) { HWY_DYNAMIC_DISPATCH
 void sort_samples(const NodeTest& test, const SumSource* sources, SortedNodes& lists, SourceList& near) {
   HWY_DYNAMIC_DISPATCH(sort_samples)(test, sources, lists, near);
 }
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits) {
-  HWY_DYNAMIC_DISPATCH(make_limits)(tables, share, count, lower, limits);
+void make_limits(std::span<const LimitTerm> terms, const float* lean, const float* bend, float scale,
+                 std::size_t count, Limits* limits) {
+  HWY_DYNAMIC_DISPATCH(make_limits)(terms, lean, bend, scale, count, limits);
 }
 
 }  // namespace lanes

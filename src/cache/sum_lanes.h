@@ -1,6 +1,7 @@
 // The inner loops of the hierarchical sum, for whatever vector instructions the processor has.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,6 +11,22 @@
 #include "nacre/cache/kernel.h"
 
 namespace nacre {
+
+/// Floats of a cache line: a vector that lies in two of them takes twice as long to read.
+struct alignas(64) Line {
+  std::array<float, 16> floats;
+};
+/// So many floats, from the beginning of a line on.
+class AlignedFloats {
+ public:
+  void resize(std::size_t size) { lines_.resize((size + 15) / 16); }
+  std::size_t size() const noexcept { return 16 * lines_.size(); }
+  float* data() noexcept { return reinterpret_cast<float*>(lines_.data()); }
+  const float* data() const noexcept { return reinterpret_cast<const float*>(lines_.data()); }
+
+ private:
+  std::vector<Line> lines_;
+};
 
 /// Sources side by side, coordinates field by field, padded with dark ones to whole vectors.
 class SourceList {
@@ -28,12 +45,26 @@ class SourceList {
   float* field(Field f) noexcept { return fields_[f].data(); }
   const Float4* powers() const noexcept { return powers_.data(); }
   Float4* powers() noexcept { return powers_.data(); }
+  /// Copies for each source the row of `width` floats that its power's fourth channel numbers: side by side
+  /// they are read as fast as powers.
+  void copy_rows(const float* rows, std::size_t width);
+  const float* rows() const noexcept { return rows_.data(); }
 
  private:
   std::array<std::vector<float>, kFieldCount> fields_;
   std::vector<Float4> powers_;
+  AlignedFloats rows_;
   std::size_t size_ = 0;
 };
+
+/// The row that a power is that of, kept where a fourth channel would be.
+inline std::uint32_t power_row(const Float4& power) noexcept {
+  return std::bit_cast<std::uint32_t>(power[3]);
+}
+inline Float4 with_row(Float4 power, std::uint32_t row) noexcept {
+  power[3] = std::bit_cast<float>(row);
+  return power;
+}
 
 /// Indices of nodes, written a vector at a time.
 class IndexList {
@@ -83,11 +114,11 @@ struct Limits {
   float lean, bend, as_point, in_series;
 };
 
-/// What limits are made of, by bin and channel: the first two; what the node's own contribution allows as a
-/// point, in a series; what a share of the sum allows.
-struct LimitTables {
-  const float *lean, *bend;
-  std::array<const float*, 3> as_point, in_series, per_third;
+/// What one channel of a kernel allows, by bin: `share` of the sum times the first, and the node's own
+/// contribution as a point, in a series.
+struct LimitTerm {
+  float share;
+  const float *per_share, *as_point, *in_series;
 };
 
 /// How a target looks at nodes.
@@ -138,9 +169,10 @@ void add_series(const KernelTables& kernel, const SumSource* sources, std::span<
 inline constexpr std::size_t kMostCoarse = 4;
 std::uint64_t add_coarsely(std::span<const KernelTables> kernels, const CoarseTest& test, SortedNodes& lists,
                            std::span<Float4> totals);
-/// Limits of `count` bins for a share of the sum, or the lower ones of these and those there are; whole
-/// vectors are read and written.
-void make_limits(const LimitTables& tables, const Rgb& share, std::size_t count, bool lower, Limits* limits);
+/// Limits of `count` bins: `lean` and `bend` as they are, and the least that any of `terms` allows, times
+/// `scale`. Whole vectors are read and written.
+void make_limits(std::span<const LimitTerm> terms, const float* lean, const float* bend, float scale,
+                 std::size_t count, Limits* limits);
 
 }  // namespace lanes
 }  // namespace nacre

@@ -139,7 +139,7 @@ TEST_P(EveryTarget, NodesCarryTheirSecondMoments) {
 }
 
 // Kernels side by side are what they are one by one: of every number around whole vectors, of fewer in one
-// channel than in others, interpolated or not, under one light or one each.
+// channel than in others, interpolated or not, under one light, a few, or one each.
 TEST_P(EveryTarget, SumsSetsAsOneByOne) {
   const std::vector<SumSource> sources = make_sources(333);
   std::vector<SumNode> nodes(sources.size());
@@ -159,7 +159,7 @@ TEST_P(EveryTarget, SumsSetsAsOneByOne) {
   rows.pad();
   const Vec3 centre(2.2f, 1.9f, -1.4f);
   for (const bool middles : {false, true})
-    for (const std::size_t count : {1u, 2u, 5u, 6u, 11u}) {
+    for (const std::size_t count : {1u, 2u, 5u, 6u, 11u, 14u}) {
       std::vector<Kernel> kernels;
       for (std::size_t i = 0; i < count; ++i) {
         const float scale = 0.5f + 0.25f * static_cast<float>(i);
@@ -167,19 +167,25 @@ TEST_P(EveryTarget, SumsSetsAsOneByOne) {
         if (middles) kernels.back().make_middles();
       }
       const std::array<std::size_t, 3> counts{count, count - count / 2, count};
-      const KernelSet set(kernels, counts, KernelSet::Tables::kAny);
-      ASSERT_EQ(set.width() % KernelSet::kStep, 0u);
-      ASSERT_EQ(set.first(3), counts[0] + counts[1] + counts[2]);
-      // Each lane sees its channel's light times 1 + its number.
-      std::vector<float> own(sources.size() * set.width());
-      for (std::size_t i = 0; i < sources.size(); ++i)
-        for (std::size_t lane = 0; lane < set.first(3); ++lane)
-          own[i * set.width() + lane] =
-              static_cast<float>(lane + 1) * sources[i].power[static_cast<int>(set.channels()[lane])];
-      for (const bool has_own : {false, true}) {
-        const float* const powers = has_own ? own.data() : nullptr;
+      for (const std::uint32_t lights : {0u, 1u, 2u, 3u, 4u, 7u}) {
+        // Light l is the first times 1 + l.
+        KernelLights seen;
+        for (std::uint32_t j = 0; j < count && lights > 0; ++j)
+          seen.push_back({j % lights, (j + 1) % lights, (3 * j + 2) % lights});
+        const KernelSet set(kernels, counts, KernelSet::Tables::kAny, seen);
+        ASSERT_EQ(set.width() % KernelSet::kStep, 0u);
+        ASSERT_EQ(set.first(3), counts[0] + counts[1] + counts[2]);
+        std::vector<float> own(sources.size() * set.row_width());
+        for (std::uint32_t l = 0; l < lights; ++l)
+          set.for_each_column(l, [&](std::size_t column, std::size_t k) {
+            for (std::size_t i = 0; i < sources.size(); ++i)
+              own[i * set.row_width() + column] =
+                  static_cast<float>(l + 1) * sources[i].power[static_cast<int>(k)];
+          });
+        const float* const powers = lights > 0 ? own.data() : nullptr;
+        if (powers) rows.copy_rows(powers, set.row_width());
         std::vector<double> totals(set.width());
-        lanes::add_sources(set, has_own ? rows : list, powers, centre, totals);
+        lanes::add_sources(set, powers ? rows : list, centre, totals);
         SetExpansion of_nodes, of_sources;
         of_nodes.clear(set.width());
         of_sources.clear(set.width());
@@ -198,7 +204,7 @@ TEST_P(EveryTarget, SumsSetsAsOneByOne) {
           for (std::size_t k = 0; k < 3; ++k) {
             if (j >= counts[k]) continue;
             const std::size_t lane = set.first(k) + j;
-            const double light = has_own ? static_cast<double>(lane + 1) : 1;
+            const double light = lights > 0 ? static_cast<double>(seen[j][k] + 1) : 1;
             const auto channel = static_cast<int>(k);
             EXPECT_NEAR(totals[lane] / (light * total[k]), 1, 1e-5) << count << " " << lane;
             EXPECT_NEAR(double{node_values[lane]} / (light * double{single_nodes.eval(at)[channel]}), 1, 1e-5)

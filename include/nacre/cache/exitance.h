@@ -108,8 +108,10 @@ class Exitance {
   };
   // A kernel that errors are held against, among the extreme ones of the family, and its tables.
   struct Guide {
-    std::size_t kernel;                           // its index
-    Rgb lit{0, 0, 0};                             // M_o under the mean irradiance
+    std::size_t kernel;  // its index
+    Rgb lit{0, 0, 0};    // M_o under the mean irradiance
+    // Channels with light whose errors are held against it, and against no guide before it.
+    std::array<bool, 3> limits{false, false, false};
     std::vector<Radius> radii;                    // from the smallest cell on, kRadiiPerOctave each
     std::array<std::vector<float>, 3> per_third;  // what a share of the sum allows, by channel
   };
@@ -138,11 +140,12 @@ class Exitance {
   // nullptr where all materials see the same light.
   const float* source_powers() const noexcept { return powers_.size() > 0 ? powers_.data() : nullptr; }
   const float* node_powers() const noexcept {
-    return powers_.size() > 0 ? powers_.data() + source_count_ * set_width_ : nullptr;
+    return powers_.size() > 0 ? powers_.data() + source_count_ * row_width_ : nullptr;
   }
   void make_kernels(const MaterialFamily& family);
   void make_set(const MaterialFamily& family, double tolerance, double farthest);
-  void add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts);
+  void add_set(std::span<const Kernel> kernels, const std::array<std::size_t, 3>& counts,
+               std::span<const ChannelChoice> choices, const MaterialFamily& family);
   void make_tables();
   void make_tables(Guide& guide, std::size_t count);
   bool in_grid(const Vec3& x) const noexcept;
@@ -173,11 +176,11 @@ class Exitance {
   std::unique_ptr<const KernelSet> set_, dark_set_;
   std::vector<float> weights_;    // of what spans them, by lane of the set and material
   std::size_t kernel_count_ = 1;  // that are summed up
-  // Of families with several indices of refraction: whose light each kernel of the set sees, by channel, and
-  // the power of each source, then of each node, for each of them.
-  std::vector<std::array<double, 3>> kernel_etas_;
+  // Of families with several indices of refraction: those whose light kernels of the set see, and the power
+  // of each source, then of each node, under each of them (KernelSet::Rows).
+  std::vector<double> light_etas_;
   LargeArray<float> powers_;
-  std::size_t source_count_ = 0, node_count_ = 0, set_width_ = 0;
+  std::size_t source_count_ = 0, node_count_ = 0, row_width_ = 0;
   std::vector<Guide> guides_;
   Promise promise_;
   double allowance_;
