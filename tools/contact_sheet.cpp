@@ -11,7 +11,8 @@ namespace nacre::tools {
 namespace {
 
 constexpr int kGap = 6, kLineHeight = 12;
-constexpr int kLeastWidth = 160;  // of a cell, which small pictures share with their labels
+constexpr int kLeastWidth = 160;       // of a cell, which small pictures share with their labels
+constexpr std::size_t kMostLines = 3;  // of a label
 constexpr std::uint8_t kBackground = 24, kInk = 220;
 
 void fill(Preview& sheet, int left, int top, int right, int bottom, std::uint8_t value) {
@@ -23,17 +24,43 @@ void fill(Preview& sheet, int left, int top, int right, int bottom, std::uint8_t
                   static_cast<std::size_t>(c)] = value;
 }
 
+bool fits(std::string text, int width) { return stb_easy_font_width(text.data()) <= width; }
+
+// Lines no wider than that, broken after blanks and commas where there are any.
+std::vector<std::string> wrap(const std::string& text, int width) {
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = begin, good = begin;
+    while (end < text.size() && fits(text.substr(begin, end + 1 - begin), width)) {
+      ++end;
+      if (text[end - 1] == ' ' || text[end - 1] == ',') good = end;
+    }
+    const bool is_last = end == text.size() || lines.size() + 1 == kMostLines;
+    if (!is_last && good > begin) end = good;
+    lines.push_back(text.substr(begin, std::max(end, begin + 1) - begin));
+    begin += lines.back().size();
+    if (lines.size() < kMostLines || begin == text.size()) continue;
+    std::string& cut = lines.back();
+    while (!cut.empty() && !fits(cut + "..", width)) cut.pop_back();
+    cut += "..";
+    break;
+  }
+  return lines;
+}
+
+std::vector<std::string> label_lines(const SheetPicture& picture, int width) {
+  std::vector<std::string> lines;
+  for (const Setting& setting : picture.settings)
+    for (std::string& line : wrap(describe(setting), width)) lines.push_back(std::move(line));
+  return lines;
+}
+
 // Letters are made of rectangles, four corners of x, y, z and a colour each.
-void write(Preview& sheet, int left, int top, int width, std::string text) {
+void write(Preview& sheet, int left, int top, std::string text) {
   struct Corner {
     float x, y, z;
     std::uint32_t colour;
   };
-  const auto fits = [&](std::string label) { return stb_easy_font_width(label.data()) <= width; };
-  if (!fits(text)) {
-    while (!text.empty() && !fits(text + "..")) text.pop_back();
-    text += "..";
-  }
   std::vector<Corner> corners(4 * (text.size() * 20 + 16));
   const int quads = stb_easy_font_print(0, 0, text.data(), nullptr, corners.data(),
                                         static_cast<int>(corners.size() * sizeof(Corner)));
@@ -84,8 +111,8 @@ Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture
   for (const SheetPicture& picture : pictures) {
     width = std::max(width, picture.thumbnail.width);
     height = std::max(height, picture.thumbnail.height);
-    lines = std::max(lines, picture.settings.size());
   }
+  for (const SheetPicture& picture : pictures) lines = std::max(lines, label_lines(picture, width).size());
   const int cell_width = width + kGap, cell_height = height + kLineHeight * static_cast<int>(lines) + kGap;
   const auto rows = static_cast<int>((count + columns - 1) / columns);
   Preview sheet;
@@ -101,8 +128,8 @@ Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture
       std::copy_n(from.rgb.begin() + std::ptrdiff_t{3} * y * from.width, 3 * from.width,
                   sheet.rgb.begin() + 3 * (std::ptrdiff_t{top + y} * sheet.width + left));
     int line = top + height + 2;
-    for (const Setting& setting : pictures[i].settings) {
-      write(sheet, left, line, width, describe(setting));
+    for (std::string& text : label_lines(pictures[i], width)) {
+      write(sheet, left, line, std::move(text));
       line += kLineHeight;
     }
   }

@@ -83,17 +83,14 @@ struct LanePowers {
 #endif
   }
   HWY_INLINE hn::Vec<D> get(const Float4& power, std::size_t row) const {
-    const float* const at = rows + row * width;
+    if constexpr (kRows == Rows::kLanes) return hn::LoadU(d, rows + row * width);
 #if HWY_TARGET == HWY_SCALAR
-    return kRows == Rows::kLanes   ? hn::LoadU(d, at)
-           : kRows == Rows::kPower ? hn::Set(d, power[static_cast<int>(column)])
-                                   : hn::Set(d, at[column]);
+    return hn::Set(d, kRows == Rows::kPower ? power[static_cast<int>(column)] : rows[row * width + column]);
 #else
-    if constexpr (kRows == Rows::kLanes) {
-      return hn::LoadU(d, at);
-    } else if constexpr (kRows == Rows::kPower) {
+    if constexpr (kRows == Rows::kPower) {
       return hn::TableLookupLanes(hn::LoadDup128(d, reinterpret_cast<const float*>(&power)), columns);
     } else {
+      const float* const at = rows + row * KernelSet::kFewColumns;
       hn::Vec<D> seen = hn::TableLookupLanes(hn::LoadU(d, at), columns);
       for (std::size_t p = 1; p < kParts; ++p)
         seen = hn::IfThenElse(in_part[p], hn::TableLookupLanes(hn::LoadU(d, at + p * kLanes), columns), seen);
@@ -176,7 +173,9 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec
                 length2(hn::Sub(load(SourceList::kX), cx), hn::Sub(load(SourceList::kY), cy),
                         hn::Sub(load(SourceList::kZ), cz)));
     }
-    const Run run{list.powers() + begin, list.rows() + begin * set.row_width(), size};
+    const float* const own =
+        kRows == KernelSet::Rows::kPower ? nullptr : list.rows() + begin * set.row_width();
+    const Run run{list.powers() + begin, own, size};
     std::size_t lane = 0;
     for (; lane + 2 * hn::Lanes(Wide()) <= set.width(); lane += 2 * hn::Lanes(Wide()))
       add_run<Wide, 2, kRows>(set, rows, run, lane, totals);

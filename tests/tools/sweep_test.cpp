@@ -210,6 +210,18 @@ TEST_F(Sweep, EveryPictureIsThatOfASingleRender) {
     EXPECT_GT(bytes(name).size(), 100u) << name;
 }
 
+// Under thumbnails, where they would be cut.
+TEST_F(Sweep, LongLabelsGoOnInTheNextLine) {
+  run("sweep s.xml --cache c.nacre --quiet --vary material=Marble -o short");
+  run("sweep s.xml --cache c.nacre --quiet --vary 'material=Pacific Ocean Surface Water' -o long");
+  const auto height = [&](const std::string& folder) {
+    const std::string png = bytes(folder + "/contact_sheet.png");
+    return 256 * static_cast<int>(static_cast<unsigned char>(png.at(22))) +
+           static_cast<unsigned char>(png.at(23));
+  };
+  EXPECT_EQ(height("long"), height("short") + 12);
+}
+
 // Mean free paths too different to share anything: to the bit what single renders are.
 TEST_F(Sweep, MultipliesCamerasLightsAndLists) {
   run("sweep s.xml --cache c.nacre -o d --quiet --zip --vary sigma_s_prime*=1:10:2 --vary "
