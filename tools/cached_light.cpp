@@ -98,35 +98,40 @@ void scale_lights(Scene& scene, const std::vector<Rgb>& scales) {
     if (scales[i] != Rgb(1, 1, 1)) scale_light(scene.lights[i], scales[i]);
 }
 
-ScaledCache load_scaled_cache(const std::string& path, const Scene& scene, bool shadows,
-                              const std::vector<Rgb>& light_scales, Report& report) {
-  const StageTimer timer(report, "read_cache");
-  ScaledCache scaled{load_cache(path), {}};
-  Cache& cache = scaled.cache;
+std::vector<LightScale> check_cache(Cache& cache, const std::string& path, const Scene& scene, bool shadows,
+                                    const std::vector<Rgb>& light_scales) {
   BakeConditions conditions = fingerprint_conditions(cache.fingerprint, scene.media.size());
   conditions.shadows = shadows;
   const std::string mismatch = describe_mismatch(cache.fingerprint, make_fingerprint(scene, conditions));
   if (!mismatch.empty() || cache.groups.size() != scene.media.size())
-    fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; bake it again",
-         mismatch.empty() ? "the number of translucent groups differs" : mismatch);
+    fail(ErrorCode::kMismatch, path, "was baked for another scene: {}; {}",
+         mismatch.empty() ? "the number of translucent groups differs" : mismatch,
+         mismatch.find("/coefficients ") == std::string::npos
+             ? "bake it again"
+             : "--interreflect is for the materials it was baked with: bake it again, or without");
+  std::vector<LightScale> scales;
   for (std::size_t m = 0; m < cache.groups.size(); ++m) {
+    CacheGroup& group = cache.groups[m];
+    const double eta = double{scene.media[m].eta()};
     // With eta in the fingerprint it is the one that was baked.
-    if (!conditions.every_eta) cache.groups[m].eta = double{scene.media[m].eta()};
-    check_eta(scaled, scene, m, scene.media[m].eta(), path);
-    scaled.scales = scale_planes(cache.groups[m], scene, light_scales, path);
+    if (!conditions.every_eta) group.eta = eta;
+    if (!serves_eta(group, eta))
+      fail(ErrorCode::kMismatch, path,
+           "the cache holds irradiance for {}, and the index of refraction of {} is {:.6g}; bake it again",
+           group.lights.empty() ? fmt::format("an index of refraction of {:.6g} alone", group.eta)
+                                : fmt::format("indices of refraction from {} to {}", kLeastEta, kMostEta),
+           medium_label(scene, m), eta);
+    scales = scale_planes(group, scene, light_scales, path);
   }
-  return scaled;
+  return scales;
 }
 
-void check_eta(const ScaledCache& scaled, const Scene& scene, std::size_t medium, float eta,
-               const std::string& path) {
-  const CacheGroup& group = scaled.cache.groups[medium];
-  if (!serves_eta(group, double{eta}))
-    fail(ErrorCode::kMismatch, path,
-         "the cache holds irradiance for {}, and the index of refraction of {} is {:.6g}; bake it again",
-         group.lights.empty() ? fmt::format("an index of refraction of {:.6g} alone", group.eta)
-                              : fmt::format("indices of refraction from {} to {}", kLeastEta, kMostEta),
-         medium_label(scene, medium), eta);
+ScaledCache load_scaled_cache(const std::string& path, const Scene& scene, bool shadows,
+                              const std::vector<Rgb>& light_scales, Report& report) {
+  const StageTimer timer(report, "read_cache");
+  ScaledCache scaled{load_cache(path), {}};
+  scaled.scales = check_cache(scaled.cache, path, scene, shadows, light_scales);
+  return scaled;
 }
 
 Cache load_matching_cache(const std::string& path, const Scene& scene, bool shadows,

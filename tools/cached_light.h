@@ -19,14 +19,15 @@ std::vector<Rgb> find_light_scales(const Scene& scene, const std::vector<std::st
 /// Multiplies what the lights send.
 void scale_lights(Scene& scene, const std::vector<Rgb>& scales);
 
-/// Loads a cache of the scene, its lights to be scaled. Throws Error(kMismatch, path) for a cache of another
-/// scene, saying what differs, for one that does not serve its indices of refraction, and where lights were
-/// baked together that are to be scaled apart; and what load_cache throws.
+/// What planes of light are to be scaled by. Throws Error(kMismatch, path) for a cache of another scene,
+/// saying what differs, for one that does not serve its indices of refraction, and where lights were baked
+/// together that are to be scaled apart. Tells groups of a single index that it is the scene's.
+std::vector<LightScale> check_cache(Cache& cache, const std::string& path, const Scene& scene, bool shadows,
+                                    const std::vector<Rgb>& light_scales);
+
+/// Loads a cache of the scene, its lights to be scaled. Throws as check_cache and load_cache.
 ScaledCache load_scaled_cache(const std::string& path, const Scene& scene, bool shadows,
                               const std::vector<Rgb>& light_scales, Report& report);
-/// Throws Error(kMismatch, path) where it does not serve a medium of that index.
-void check_eta(const ScaledCache& scaled, const Scene& scene, std::size_t medium, float eta,
-               const std::string& path);
 
 /// Loads a cache and makes its irradiance that of the scene: its indices of refraction, its lights scaled.
 /// Throws as load_scaled_cache.

@@ -197,6 +197,7 @@ void add_bake_options(CLI::App& command, BakeOptions& options) {
       .add_option("--irradiance-error", options.irradiance_error,
                   "Refine samples whose relative standard error is above this, with up to 64 times as many "
                   "connections")
+      ->check(finite_number())
       ->check(CLI::Range(1e-4, 1.0))
       ->check(finite_number());
   command.add_flag("--interreflect", options.interreflect,

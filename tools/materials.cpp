@@ -113,12 +113,15 @@ void add_materials_command(CLI::App& app, const std::string& command_line) {
   command
       ->add_option("--mfp", options->mean_free_path, "MM or R,G,B: with the mean free path 1/sigma_t' in mm")
       ->delimiter(',')
+      ->check(finite_number())
       ->check(CLI::Range(1e-6, 1e9));
   command->add_option("--profile", options->profile, "For this profile alone (default: each)")
       ->check(CLI::IsMember(std::vector<std::string>(kProfileNames.begin(), kProfileNames.end())));
   command->add_option("--eta", options->eta, "Relative index of refraction (default: bk7 in air, 1.50418)")
+      ->check(finite_number())
       ->check(CLI::Range(0.1, 10.0));
   command->add_option("--g", options->g, "Mean cosine: print the unreduced sigma_s, too")
+      ->check(finite_number())
       ->check(CLI::Range(-0.999, 0.999));
   add_common_options(*command, options->common);
   command->callback([options, command_line] { run(*options, command_line); });

@@ -3,6 +3,7 @@
 
 #include "common.h"
 #include "nacre/render/merge_images.h"
+#include "picture.h"
 #include "render_options.h"
 
 namespace nacre::tools {
@@ -19,11 +20,10 @@ void run(const Options& options, const std::string& command_line) {
   const std::optional<double> exposure = parse_exposure(options.exposure);
   if (options.exposure != kExposure && !options.png)
     throw UsageError("--exposure is that of the preview: give --png");
+  check_picture_name(options.output);
   Session session(options.common, command_line);
   check_writable(options.output, options.parts);
   const std::string preview = std::filesystem::path(options.output).replace_extension(".png").string();
-  if (options.png && preview == options.output)
-    throw UsageError("-o " + options.output + ": --png writes there; name the picture .exr");
   const Image image = [&] {
     const StageTimer timer(session.report(), "load");
     return merge_images(options.parts);

@@ -11,6 +11,15 @@
 
 namespace nacre::tools {
 
+void check_picture_name(const std::string& output) {
+  std::string ending = std::filesystem::path(output).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  for (const char* const other : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".pfm", ".webp"})
+    if (ending == other)
+      throw UsageError("-o " + output +
+                       ": pictures are OpenEXR; name it .exr, --png writes a preview beside it");
+}
+
 KeyValues make_conditions(const RenderOptions& options, const RenderParams& params, const Scene& scene,
                           const Cache& cache) {
   KeyValues conditions =

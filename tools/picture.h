@@ -15,6 +15,9 @@ struct Picture {
   std::string key = {};  // of all that a frame of a film depends on; empty: rendered again each time
 };
 
+/// Throws UsageError for a name that is one of another format than OpenEXR.
+void check_picture_name(const std::string& output);
+
 /// All that pictures depend on but for their cameras. `cache` is empty where the command bakes, or needs
 /// none.
 KeyValues make_conditions(const RenderOptions& options, const RenderParams& params, const Scene& scene,

@@ -27,6 +27,7 @@ struct Options : RenderOptions {
 
 // Options that have nothing to act on are mistakes.
 void check_combination(const Options& options) {
+  check_picture_name(options.output);
   check_render_options(options);
   if (!options.tile.empty() && !options.crop.empty())
     throw UsageError("--tile and --crop both choose a part of the picture; give one");

@@ -174,6 +174,7 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
       ->check(CLI::IsMember(kMethods));
   command
       .add_option("--tolerance", options.tolerance, "Relative error of the hierarchical sum (default: 0.01)")
+      ->check(finite_number())
       ->check(CLI::Range(0.0, 1.0))
       ->check(finite_number());
   command

@@ -57,12 +57,17 @@ void require_slurm() {
 std::string parse_slurm_option(const std::string& text) {
   std::string option = text.starts_with("-") ? text : "--" + text;
   const std::string name = option.substr(0, option.find('='));
+  // sbatch takes beginnings of long names, and values right behind short ones.
+  const auto means = [&](const std::string& known) {
+    return known.starts_with("--") ? name.size() > 3 && known.starts_with(name)
+                                   : name.size() > 1 && name[1] != '-' && name.starts_with(known);
+  };
   for (const char* const own :
        {"--array", "-a", "--dependency", "-d", "--output", "-o", "--error", "-e", "--parsable", "--wrap",
         "--quiet", "-Q", "--chdir", "-D", "--wait", "-W", "--kill-on-invalid-dep", "--open-mode"})
-    if (name == own) throw UsageError("--slurm-option " + text + ": that is nacre's to set");
+    if (means(own)) throw UsageError("--slurm-option " + text + ": that is nacre's to set");
   for (const char* const other : {"--test-only", "--help", "-h", "--usage", "--version", "-V"})
-    if (name == other) throw UsageError("--slurm-option " + text + ": with that sbatch submits nothing");
+    if (means(other)) throw UsageError("--slurm-option " + text + ": with that sbatch submits nothing");
   return option;
 }
 

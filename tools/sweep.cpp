@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include "cached_light.h"
 #include "contact_sheet.h"
@@ -81,15 +84,15 @@ void render_points(const SweepOptions& options, Scene& scene, std::size_t medium
     if (!last || last->first != group.first) {
       scene.media = media;
       scene.lights = lights;
-      if (!scene.media.empty()) {
-        scene.media[medium].ext_ior = members[0]->material.ext_ior;
-        scene.media[medium].int_ior = members[0]->material.int_ior;
-      }
+      if (!scene.media.empty()) scene.media[medium] = members[0]->material;
       const std::vector<Rgb> scales = find_light_scales(scene, group.first);
       cache.emplace(
           load_scaled_cache(options.cache, scene, !options.bake.no_shadows, scales, session.report()));
-      for (const SweepPoint* const point : members)
-        if (!scene.media.empty()) check_eta(*cache, scene, medium, point->material.eta(), options.cache);
+      if (!scene.media.empty()) {
+        scene.media[medium] = media[medium];
+        scene.media[medium].ext_ior = members[0]->material.ext_ior;
+        scene.media[medium].int_ior = members[0]->material.int_ior;
+      }
       scale_lights(scene, scales);
       refresh(world);
     }
@@ -110,6 +113,22 @@ void render_points(const SweepOptions& options, Scene& scene, std::size_t medium
       render_batch(options, medium, materials,
                    std::span(members).subspan(begin, std::min(together, members.size() - begin)), world,
                    *cache, session);
+  }
+}
+
+// Before anything is rendered, whether the cache serves every picture: its lights, its index of refraction,
+// and its material, where light that left translucent objects was baked in.
+void check_points(const SweepOptions& options, Scene& scene, std::size_t medium, Cache& cache,
+                  std::span<const SweepPoint> points) {
+  const bool interreflects = fingerprint_conditions(cache.fingerprint, scene.media.size()).interreflect;
+  std::set<std::pair<std::vector<std::string>, float>> checked;
+  for (const SweepPoint& point : points) {
+    if (!checked.emplace(point.lights, point.material.eta()).second && !interreflects) continue;
+    std::optional<Medium> kept;
+    if (!scene.media.empty()) kept = std::exchange(scene.media[medium], point.material);
+    check_cache(cache, fmt::format("{}: picture {}", options.cache, picture_name(point.index)), scene,
+                !options.bake.no_shadows, find_light_scales(scene, point.lights));
+    if (kept) scene.media[medium] = *kept;
   }
 }
 
@@ -164,9 +183,16 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     fail(ErrorCode::kValue, options.scene.path, "has no translucent medium to vary");
   const std::size_t medium = find_medium(scene, options.medium, of_medium);
   Body body;
+  std::vector<SweepPoint> points;
+  std::vector<Medium> media;
+  for (std::size_t i = 0; i < plan.points.size(); ++i) {
+    points.push_back(make_sweep_point(options, scene, medium, i, plan.points[i]));
+    media.push_back(points.back().material);
+  }
   const auto [conditions, of_whole] = [&] {
     const StageTimer timer(session.report(), "read_cache");
-    const Cache cache = load_cache(options.cache);
+    Cache cache = load_cache(options.cache);
+    check_points(options, scene, medium, cache, points);
     RenderParams params = make_render_params(options, scene, options.camera);
     std::array<KeyValues, 2> result{make_conditions(options, params, scene, cache)};
     params.crop_x = params.crop_y = params.crop_width = params.crop_height = 0;
@@ -176,12 +202,6 @@ void run(const SweepOptions& options, const CLI::App& command, const std::string
     for (KeyValues& values : result) values.emplace_back("medium", options.medium);
     return result;
   }();
-  std::vector<SweepPoint> points;
-  std::vector<Medium> media;
-  for (std::size_t i = 0; i < plan.points.size(); ++i) {
-    points.push_back(make_sweep_point(options, scene, medium, i, plan.points[i]));
-    media.push_back(points.back().material);
-  }
   const MaterialFamilies materials =
       sort_materials(media, body, mixes_eta(make_render_params(options, scene, options.camera)));
   for (SweepPoint& point : points) {

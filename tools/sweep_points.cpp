@@ -10,12 +10,13 @@
 namespace nacre::tools {
 
 void check_sweep_options(const SweepOptions& options) {
+  if (!uses_cache(method_of(options)))
+    throw UsageError("--method " + options.method +
+                     ": a sweep is made from a cache; give hierarchical or exact, or render one by one");
   check_render_options(options);
   if (options.vary.empty() == options.plan.empty())
     throw UsageError("give either --vary KEY=... or --plan FILE");
   if (options.zip && options.vary.size() < 2) throw UsageError("--zip walks several --vary together");
-  if (!uses_cache(method_of(options)))
-    throw UsageError("--method " + options.method + ": a sweep is made from a cache");
   if (options.engine.uses_slurm() && !options.shard.empty())
     throw UsageError("--shard K/N is for one machine; --engine slurm gives every job its own");
   check_engine_options(options.engine);

@@ -2,6 +2,7 @@
 #include "render/translucency.h"
 
 #include "nacre/base/random.h"
+#include "nacre/base/simd.h"
 #include "nacre/cache/fingerprint.h"
 #include "nacre/cache/nearest.h"
 #include "nacre/cache/relight.h"
@@ -118,7 +119,8 @@ KeyValues Translucency::make_key() const {
                 {"mm per unit", fmt::format("{}", m.scale)},
                 {"profile", std::string(kProfileNames[static_cast<std::size_t>(m.profile)])},
                 {"tolerance", fmt::format("{}", tolerance_)},
-                {"nodes", field_->nodes_digest()}};
+                {"nodes", field_->nodes_digest()},
+                {"--simd", simd_target()}};  // sums differ by rounding
   for (auto& entry : key) entry.first = label + "/" + entry.first;
   return key;
 }

@@ -144,6 +144,10 @@ TEST_F(Program, ExitanceIsKept) {
       run_nacre(folder_, "render s.xml --cache s.cache -o x.exr --exitance e.exitance -D sigma_a=0.2");
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.output.find("sigma_a"), std::string::npos) << refused.output;
+  // Other instructions round in other ways: no mixture of both.
+  const std::string other =
+      run("render s.xml --cache s.cache -o x.exr --exitance e.exitance --simd scalar", 1);
+  EXPECT_NE(other.find("--simd"), std::string::npos) << other;
   const auto info = run_nacre(folder_, "info e.exitance");
   EXPECT_EQ(info.exit_code, 0) << info.output;
 }

@@ -127,7 +127,8 @@ TEST_F(Slurm, SaysWhatSlurmRefuses) {
     EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
   };
   expect_refusal("--engine slurm --quiet --slurm-option partition=gold", 1, "invalid partition");
-  expect_refusal("--engine slurm --slurm-option array=1-3", 2, "nacre's to set");
+  for (const char* const option : {"array=1-3", "arr=1-3", "-a1-3", "-o/elsewhere", "dep=1"})
+    expect_refusal(std::string("--engine slurm --slurm-option=") + option, 2, "nacre's to set");
   expect_refusal("--engine slurm --shard 1/2", 2, "--shard");
   expect_refusal("--shards 2", 2, "--engine slurm");
   EXPECT_TRUE(read_command("squeue -h").empty());

@@ -151,6 +151,23 @@ TEST_F(Sweep, PartsOfDifferentPicturesAreNotMerged) {
   EXPECT_NE(run("merge a/0001.exr b/0002.exr -o x.exr", 1).find("nacre:settings differs"), std::string::npos);
 }
 
+// Before anything is rendered, or any folder made.
+TEST_F(Sweep, RefusesCachesThatDoNotServeEveryPoint) {
+  const auto refused = [&](const std::string& options, const std::string& why) {
+    const std::string output = run("sweep s.xml --quiet -o none " + options, 1);
+    EXPECT_NE(output.find(why), std::string::npos) << output;
+    EXPECT_NE(output.find("picture 0002"), std::string::npos) << output;
+    EXPECT_FALSE(std::filesystem::exists(folder_.file("none")));
+  };
+  folder_.write("p.json", R"([{"g": 0.5}, {"light.sun": 0.5}])");
+  run("bake s.xml -o together.nacre --quiet --points 500");
+  refused("--cache together.nacre --plan p.json", "--per-light");
+  run("bake s.xml -o fixed.nacre --fixed-eta --quiet --points 500");
+  refused("--cache fixed.nacre --vary 'eta=1.5;1.3'", "eta was 1.5 and is 1.3");
+  run("bake s.xml -o among.nacre --interreflect --quiet --points 500");
+  refused("--cache among.nacre --vary 'sigma_a=0.01,0.02,0.03;0.5'", "--interreflect");
+}
+
 // In a folder that is none of a sweep, whatever has the name of an output is somebody's.
 TEST_F(Sweep, ReplacesNothingButSweeps) {
   const std::string sweep = "sweep s.xml --quiet --vary 'g=0;0.5' ";
