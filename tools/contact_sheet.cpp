@@ -108,11 +108,15 @@ Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture
   columns = std::clamp<std::size_t>(columns, 1, std::max<std::size_t>(count, 1));
   int width = kLeastWidth, height = 0;
   std::size_t lines = 0;
+  std::vector<std::vector<std::string>> labels;
   for (const SheetPicture& picture : pictures) {
     width = std::max(width, picture.thumbnail.width);
     height = std::max(height, picture.thumbnail.height);
   }
-  for (const SheetPicture& picture : pictures) lines = std::max(lines, label_lines(picture, width).size());
+  for (const SheetPicture& picture : pictures) {
+    labels.push_back(label_lines(picture, width));
+    lines = std::max(lines, labels.back().size());
+  }
   const int cell_width = width + kGap, cell_height = height + kLineHeight * static_cast<int>(lines) + kGap;
   const auto rows = static_cast<int>((count + columns - 1) / columns);
   Preview sheet;
@@ -128,8 +132,8 @@ Preview make_contact_sheet(const SweepPlan& plan, const std::vector<SheetPicture
       std::copy_n(from.rgb.begin() + std::ptrdiff_t{3} * y * from.width, 3 * from.width,
                   sheet.rgb.begin() + 3 * (std::ptrdiff_t{top + y} * sheet.width + left));
     int line = top + height + 2;
-    for (std::string& text : label_lines(pictures[i], width)) {
-      write(sheet, left, line, std::move(text));
+    for (const std::string& text : labels[i]) {
+      write(sheet, left, line, text);
       line += kLineHeight;
     }
   }

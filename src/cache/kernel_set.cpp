@@ -21,23 +21,23 @@ AlignedFloats KernelSet::interleave(std::span<const Table> tables, std::size_t f
     bins.first = std::min(bins.first, table.bins.first);
     bins.last = std::max(bins.last, table.bins.last);
   }
+  const auto count = static_cast<std::size_t>(bins.last - bins.first) + 1;
   AlignedFloats result;
-  result.resize((static_cast<std::size_t>(bins.last - bins.first) + 1) * fields * width());
+  result.resize(count * fields * width());
   constexpr std::size_t kRun = 512;
-  parallel_for(
-      static_cast<std::size_t>(bins.last - bins.first) + 1, kRun, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          const std::int32_t bin = bins.first + static_cast<std::int32_t>(i);
-          for (std::size_t k = 0; k < 3; ++k)
-            for (std::size_t lane = first(k); lane < first(k + 1); ++lane) {
-              const Table& table = tables[lane - first(k)];
-              const auto row = static_cast<std::size_t>(std::clamp(bin, table.bins.first, table.bins.last) -
-                                                        table.bins.first);
-              for (std::size_t f = 0; f < fields; ++f)
-                result.data()[(i * fields + f) * width() + lane] = table.rows[(row * fields + f) * 4 + k];
-            }
+  parallel_for(count, kRun, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::int32_t bin = bins.first + static_cast<std::int32_t>(i);
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t lane = first(k); lane < first(k + 1); ++lane) {
+          const Table& table = tables[lane - first(k)];
+          const auto row =
+              static_cast<std::size_t>(std::clamp(bin, table.bins.first, table.bins.last) - table.bins.first);
+          for (std::size_t f = 0; f < fields; ++f)
+            result.data()[(i * fields + f) * width() + lane] = table.rows[(row * fields + f) * 4 + k];
         }
-      });
+    }
+  });
   return result;
 }
 

@@ -95,18 +95,13 @@ HWY_INLINE Float4 sum(Quads a) {
 }
 #endif
 
-// Calls `action` with truths that the compiler knows.
+// Calls `action` with a truth that the compiler knows.
 template <class Action>
 HWY_INLINE void with_truth(bool truth, const Action& action) {
   if (truth)
     action(std::true_type());
   else
     action(std::false_type());
-}
-template <class Action>
-HWY_INLINE void with_truths(bool a, bool b, const Action& action) {
-  with_truth(a,
-             [&](auto known) HWY_ATTR { with_truth(b, [&](auto other) HWY_ATTR { action(known, other); }); });
 }
 
 // Where a distance lies in a table: the cell, and the fraction of it.

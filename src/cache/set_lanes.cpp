@@ -18,12 +18,17 @@ namespace nacre::lanes::HWY_NAMESPACE {
 using Wide = hn::CappedTag<float, 2 * KernelSet::kStep>;
 using Narrow = hn::CappedTag<float, KernelSet::kStep>;
 
-// Calls `action` with a tag and the first lane for each vector of a set's lanes.
-template <class Action>
+// Calls `action` with a tag, the first lane, and how many vectors from there on, for all of a set's lanes:
+// up to `kMost` wide ones at once.
+template <std::size_t kMost, class Action>
 HWY_INLINE void for_each_vector(const KernelSet& set, const Action& action) {
+  using One = std::integral_constant<std::size_t, 1>;
+  using Most = std::integral_constant<std::size_t, kMost>;
+  const std::size_t wide = hn::Lanes(Wide()), narrow = hn::Lanes(Narrow());
   std::size_t lane = 0;
-  for (; lane + hn::Lanes(Wide()) <= set.width(); lane += hn::Lanes(Wide())) action(Wide(), lane);
-  for (; lane < set.width(); lane += hn::Lanes(Narrow())) action(Narrow(), lane);
+  for (; lane + kMost * wide <= set.width(); lane += kMost * wide) action(Wide(), lane, Most());
+  for (; lane + wide <= set.width(); lane += wide) action(Wide(), lane, One());
+  for (; lane < set.width(); lane += narrow) action(Narrow(), lane, One());
 }
 
 // What one run of sources finds in a table with `kFields` fields a row.
@@ -176,13 +181,9 @@ HWY_INLINE void add_list(const KernelSet& set, const SourceList& list, const Vec
     const float* const own =
         kRows == KernelSet::Rows::kPower ? nullptr : list.rows() + begin * set.row_width();
     const Run run{list.powers() + begin, own, size};
-    std::size_t lane = 0;
-    for (; lane + 2 * hn::Lanes(Wide()) <= set.width(); lane += 2 * hn::Lanes(Wide()))
-      add_run<Wide, 2, kRows>(set, rows, run, lane, totals);
-    for (; lane + hn::Lanes(Wide()) <= set.width(); lane += hn::Lanes(Wide()))
-      add_run<Wide, 1, kRows>(set, rows, run, lane, totals);
-    for (; lane < set.width(); lane += hn::Lanes(Narrow()))
-      add_run<Narrow, 1, kRows>(set, rows, run, lane, totals);
+    for_each_vector<2>(set, [&](auto d, std::size_t lane, auto vectors) HWY_ATTR {
+      add_run<decltype(d), vectors.value, kRows>(set, rows, run, lane, totals);
+    });
   }
 }
 
@@ -237,7 +238,7 @@ HWY_INLINE void add_structs(const KernelSet& set, const Struct* structs, const f
       w[kTrace] = kMoments ? traces[i] : 0;
       w[kStretch] = kMoments ? stretches[i] : 0;
     }
-    for_each_vector(set, [&](auto d, std::size_t lane) HWY_ATTR {
+    for_each_vector<1>(set, [&](auto d, std::size_t lane, auto) HWY_ATTR {
       using D = decltype(d);
       using V = hn::Vec<D>;
       const LanePowers<kRows, D> seen(d, set, powers, lane);

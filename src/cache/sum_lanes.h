@@ -46,7 +46,7 @@ class SourceList {
   const Float4* powers() const noexcept { return powers_.data(); }
   Float4* powers() noexcept { return powers_.data(); }
   /// Copies for each source the row of `width` floats that its power's fourth channel numbers: side by side
-  /// they are read as fast as powers.
+  /// they are read as fast as powers. After `pad`.
   void copy_rows(const float* rows, std::size_t width);
   const float* rows() const noexcept { return rows_.data(); }
 
